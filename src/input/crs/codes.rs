@@ -4,9 +4,9 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-/// Systems whose map has the formulas of a sphere, though their datum has an ellipsoid (EPSG method 1027). Version 1 of the text cannot say
-/// that: what it says is kilometres beside them.
-pub(crate) const SPHERICAL_ON_ELLIPSOID: [u32; 3] = [3973, 3974, 9311];
+/// Systems whose map has the formulas of a sphere, though their datum has an ellipsoid (EPSG methods 1027 and 9834). Version 1 of the text
+/// cannot say that: what it says is kilometres beside them.
+pub(crate) const SPHERICAL_ON_ELLIPSOID: [u32; 4] = [3973, 3974, 3975, 9311];
 
 /// A code and well-known text on each line.
 const SYSTEMS: &str = include_str!("codes/systems.tsv");

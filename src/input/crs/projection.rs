@@ -43,7 +43,8 @@ impl Projection {
         let comparable = comparable_name(name);
         let method = match method(name).unwrap_or(&comparable) {
             "merc" if is_web_mercator(system) => WEB_MERCATOR,
-            "laea" if system.epsg().is_some_and(|code| SPHERICAL_ON_ELLIPSOID.contains(&code)) => "laea spherical",
+            "laea" if is_spherical(system) => "laea spherical",
+            "cea" if is_spherical(system) => "cea spherical",
             method => method,
         };
         let parameters =
@@ -148,6 +149,11 @@ impl Projection {
     /// Returns whether x grows to the west, or y to the south.
     pub(crate) fn has_other_axes(&self) -> bool {
         self.westward == Some(true) || self.southward == Some(true)
+    }
+
+    /// Returns whether x may grow to the west and y to the south: whether the text says no other directions.
+    pub(crate) fn may_go_south_west(&self) -> bool {
+        self.westward != Some(false) && self.southward != Some(false)
     }
 
     /// Returns the names of the parameters that are not left out.
@@ -264,6 +270,11 @@ fn is_web_mercator(system: &WktNode) -> bool {
     let is = |name: &str, wanted: f64| word(name).is_none_or(|(_, value)| value.parse() == Ok(wanted));
     let is_true_to_scale = is("k", 1.0) && is("k_0", 1.0) && is("lat_ts", 0.0);
     is_spherical_extension(system) && is("a", 6_378_137.0) && is("b", 6_378_137.0) && is_true_to_scale
+}
+
+/// Returns whether the code of a system says that its map has the formulas of a sphere.
+fn is_spherical(system: &WktNode) -> bool {
+    system.epsg().is_some_and(|code| SPHERICAL_ON_ELLIPSOID.contains(&code))
 }
 
 /// Returns whether x grows to the west, and whether y grows to the south; `None` where the text does not say. Around a pole, both axes

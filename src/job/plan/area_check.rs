@@ -7,10 +7,7 @@ use crate::input::{AreaOfUse, Crs, CrsKind, CrsTransform, DatumRule, Source, Uni
 use crate::job::plan::area_cure::{Change, changes};
 use crate::job::plan::common_crs::TRANSFORM;
 use crate::job::plan::extent::{Extent, SourceBox};
-use crate::job::plan::globe_system::globe_system;
 use crate::job::plan::height_range::{HeightSample, may_reach};
-use crate::output::geoid::Geoid;
-use crate::output::tiles3d::globe::Globe;
 use crate::{Error, Result, Warnings};
 use std::collections::HashMap;
 
@@ -174,41 +171,14 @@ fn places(source: &Source, claim: &Option<SourceBox>, common: &CommonPlace) -> V
     (0..9).map(|i| [at(i % 3, 0), at(i / 3, 1)]).collect()
 }
 
-/// The ways to the globe of systems that sources have in common.
+/// The ways to longitude and latitude of systems that sources have in common. One that is not computed has none.
 #[derive(Default)]
-struct Ways(HashMap<String, Option<(AreaOfUse, ToDegrees)>>);
+struct Ways(HashMap<String, Option<(AreaOfUse, CrsTransform)>>);
 
 impl Ways {
-    fn of(&mut self, crs: &Crs) -> Option<&(AreaOfUse, ToDegrees)> {
-        let way = || Some((AreaOfUse::of(crs)?, ToDegrees::of(crs)?));
+    fn of(&mut self, crs: &Crs) -> Option<&(AreaOfUse, CrsTransform)> {
+        let way = || Some((AreaOfUse::of(crs)?, CrsTransform::to_rough_degrees(crs).ok()?));
         self.0.entry(format!("{crs:?}")).or_insert_with(way).as_ref()
-    }
-}
-
-/// The way from a system to longitude and latitude.
-enum ToDegrees {
-    Computed(Box<CrsTransform>),
-    /// For maps that this program does not compute itself.
-    Library(Box<Globe>),
-}
-
-impl ToDegrees {
-    fn of(crs: &Crs) -> Option<ToDegrees> {
-        if let Ok(way) = CrsTransform::to_rough_degrees(crs) {
-            return Some(ToDegrees::Computed(Box::new(way)));
-        }
-        let metres = crs.metres_per_unit()?;
-        let globe = Globe::new(globe_system(crs, metres).ok()?, metres, Geoid::open(None).ok()?).ok()?;
-        Some(ToDegrees::Library(Box::new(globe)))
-    }
-
-    fn apply(&self, place: [f64; 2]) -> Option<[f64; 2]> {
-        match self {
-            ToDegrees::Computed(way) => way.apply(place),
-            ToDegrees::Library(globe) => {
-                globe.geographic(place[0], place[1]).ok().map(|place| place.map(f64::to_degrees))
-            }
-        }
     }
 }
 
@@ -229,7 +199,7 @@ struct Outside {
 
 impl Outside {
     /// Returns how the nearest of some places lies outside the area of a system; `None` if it does not lie far outside.
-    fn of(said: &SaidSystem, (area, way): &(AreaOfUse, ToDegrees), places: &[[f64; 2]]) -> Option<Outside> {
+    fn of(said: &SaidSystem, (area, way): &(AreaOfUse, CrsTransform), places: &[[f64; 2]]) -> Option<Outside> {
         let beyond = |place: &[f64; 2]| way.apply(*place).map_or([f64::INFINITY; 2], |degrees| area.beyond(degrees));
         let place = *places.iter().min_by(|a, b| arc(beyond(a)).total_cmp(&arc(beyond(b))))?;
         let (degrees, beyond) = (way.apply(place), beyond(&place));

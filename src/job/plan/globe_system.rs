@@ -1,20 +1,19 @@
 //! The projected system of a job, from which its terrain can be placed on the globe.
 
 use crate::input::{Crs, GlobeWay};
-use crate::output::tiles3d::globe::{Geographic, GlobeSystem};
+use crate::output::tiles3d::globe::GlobeSystem;
 
 /// Returns the system of `crs`, with coordinates in units of `metres`, and its way to the globe.
 ///
 /// # Errors
-/// A sentence if it leads to no longitude and latitude.
+/// A sentence if it leads to no longitude and latitude that this program computes.
 pub(crate) fn globe_system(crs: &Crs, metres: f64) -> Result<GlobeSystem, String> {
     let definition = crs.proj4_definition().ok_or_else(|| match &crs.name {
         Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
         None => "no input names its coordinate system".to_string(),
     })?;
-    let way = GlobeWay::of(crs, &definition, metres);
-    let computed = way.map(|way| -> Geographic { Box::new(move |place| way.geographic(place)) });
-    Ok(GlobeSystem { definition: with_unit(&definition, metres), computed })
+    let way = GlobeWay::of(crs, &definition, metres)?;
+    Ok(GlobeSystem { definition: with_unit(&definition, metres), way: Box::new(move |place| way.geographic(place)) })
 }
 
 /// Returns the system of `definition` with coordinates in units of `metres`. A file may say another unit than the code that it names.

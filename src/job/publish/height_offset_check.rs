@@ -24,7 +24,7 @@ pub fn check_height_offset(plan: &Plan) -> Result<()> {
     let Bounds { min: [west, south], max: [east, north] } = plan.extent;
     let area = Bounds { min: [west, south, 0], max: [east, north, 0] };
     // A grid may lack heights at sea, so one place is enough.
-    match Ground::new(extras, system, geoid).and_then(|ground| ground.seen_from(area)) {
+    match Ground::new(extras, system, geoid).seen_from(area) {
         Err(NotPlaced::Height(error)) => Err(error),
         _ => Ok(()),
     }

@@ -46,7 +46,7 @@ pub fn place(crs: &Crs, frame: &Frame, geoid: Geoid, root: &mut TilesetNode) -> 
     let extras = frame.extras();
     let system = globe_system(crs, extras.metres_per_unit)?;
     let definition = system.definition.clone();
-    let ground = Ground::new(extras, system, geoid)?;
+    let ground = Ground::new(extras, system, geoid);
     let curvature = extras.curvature.as_ref();
     let middle = ground.seen_from(curvature.map_or(root.bounds, Curvature::bounds))?;
     let transform = ground.tangent(middle)?;

@@ -40,10 +40,10 @@ pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> crate::Result<Option<Curv
     let Some(system) = bendable(plan) else { return Ok(None) };
     let (output, extras) = (&plan.options.output, plan.frame.extras());
     let geoid = Geoid::open(output.height_offset.as_ref())?;
-    let found = Ground::new(extras, system, geoid).and_then(|ground| {
-        let distortion = ground.distortion(&ground.tangent(ground.seen_from(bounds)?)?, bounds)?;
-        (distortion > ONE_TRANSFORM).then(|| bent_for(&ground, bounds, output)).transpose()
-    });
+    let ground = Ground::new(extras, system, geoid);
+    let distortion = || ground.distortion(&ground.tangent(ground.seen_from(bounds)?)?, bounds);
+    let found = distortion()
+        .and_then(|distortion| (distortion > ONE_TRANSFORM).then(|| bent_for(&ground, bounds, output)).transpose());
     match found {
         // The step that publishes says why a terrain has no place on the globe.
         Err(NotPlaced::System(_)) => Ok(None),

@@ -1,13 +1,10 @@
 //! Places a terrain in a projected coordinate system on the WGS 84 ellipsoid.
 //!
-//! The sines are those of the crate `libm`, which gives the same bits on every machine. Where the program does not compute a projection
-//! itself, the crate `proj4rs` does, with the machine's mathematics library: then the last digits of a transform may differ between machines.
+//! The sines are those of the crate `libm`, which gives the same bits on every machine.
 
 use crate::Error;
 use crate::output::geoid::Geoid;
 use glam::{DAffine3, DMat3, DMat4, DVec3};
-use proj4rs::Proj;
-use proj4rs::transform::transform;
 
 /// The greater half axis of the WGS 84 ellipsoid in metres.
 const SEMI_MAJOR: f64 = 6_378_137.0;
@@ -32,17 +29,6 @@ impl From<String> for NotPlaced {
     }
 }
 
-/// Says why a definition cannot be used. A datum such as NAD27 leads to WGS 84 by a grid alone.
-fn why_not_read(definition: &str, error: &str) -> String {
-    if error.to_ascii_lowercase().contains("grid") {
-        return format!(
-            "the way from the datum of {definition} to WGS 84 needs a grid, which this program does not have (transform the points to \
-             a datum such as NAD83 first)"
-        );
-    }
-    format!("{definition}: {error}")
-}
-
 /// Computes longitude and latitude in radians on WGS 84 of x and y; `None` outside the range of the projection.
 pub type Geographic = Box<dyn Fn([f64; 2]) -> Option<[f64; 2]> + Send + Sync>;
 
@@ -50,15 +36,13 @@ pub type Geographic = Box<dyn Fn([f64; 2]) -> Option<[f64; 2]> + Send + Sync>;
 pub struct GlobeSystem {
     /// In the form of PROJ.4.
     pub definition: String,
-    /// Its way to longitude and latitude, with the same bits on every machine. `None` leaves that to the crate `proj4rs`.
-    pub computed: Option<Geographic>,
+    /// Its way to longitude and latitude, with the same bits on every machine.
+    pub way: Geographic,
 }
 
 /// The map from a projected system to the ellipsoid.
 pub struct Globe {
-    from: Proj,
-    to: Proj,
-    computed: Option<Geographic>,
+    way: Geographic,
     /// Metres in a unit of x and y.
     metres_per_unit: f64,
     /// What is added to heights.
@@ -67,17 +51,8 @@ pub struct Globe {
 
 impl Globe {
     /// Returns the map from a system. Its heights count from `geoid`.
-    ///
-    /// # Errors
-    /// A sentence that says why there is no such map.
-    pub fn new(system: GlobeSystem, metres_per_unit: f64, geoid: Geoid) -> Result<Globe, String> {
-        let parse = |text: &str| Proj::from_proj_string(text).map_err(|e| why_not_read(text, &e.to_string()));
-        let from = parse(&system.definition)?;
-        if from.is_latlong() || from.is_geocent() {
-            return Err("it is not a projected system".into());
-        }
-        let to = parse("+proj=longlat +datum=WGS84 +no_defs")?;
-        Ok(Globe { from, to, computed: system.computed, metres_per_unit, geoid })
+    pub fn new(system: GlobeSystem, metres_per_unit: f64, geoid: Geoid) -> Globe {
+        Globe { way: system.way, metres_per_unit, geoid }
     }
 
     /// Returns the earth-centred x, y, z in metres of the place at `x`, `y` (source units), `height` metres above the geoid.
@@ -107,12 +82,7 @@ impl Globe {
     /// # Errors
     /// A sentence if the place is outside the range of the projection.
     pub fn geographic(&self, x: f64, y: f64) -> Result<[f64; 2], String> {
-        if let Some(computed) = &self.computed {
-            return computed([x, y]).ok_or_else(|| "out of range".into());
-        }
-        let mut point = (x, y, 0.0);
-        transform(&self.from, &self.to, &mut point).map_err(|e| e.to_string())?;
-        if point.0.is_finite() && point.1.is_finite() { Ok([point.0, point.1]) } else { Err("out of range".into()) }
+        (self.way)([x, y]).ok_or_else(|| "out of range".into())
     }
 
     /// Returns the metres to add to heights at a place (source units).
@@ -196,17 +166,4 @@ pub fn relative_place(transform: &[f64; 16], place: [f64; 3]) -> [f64; 3] {
 
 fn affine(transform: &[f64; 16]) -> DAffine3 {
     DAffine3::from_mat4(DMat4::from_cols_array(transform))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_datum_that_needs_a_grid_is_named() {
-        let geoid = Geoid::open(None).unwrap();
-        let definition = "+proj=utm +zone=15 +datum=NAD27 +units=m +no_defs".into();
-        let why = Globe::new(GlobeSystem { definition, computed: None }, 1.0, geoid).err().unwrap();
-        assert!(why.contains("needs a grid") && why.contains("NAD27") && why.contains("NAD83"), "{why}");
-    }
 }

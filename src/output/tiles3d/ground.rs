@@ -24,12 +24,9 @@ pub struct Ground<'a> {
 
 impl<'a> Ground<'a> {
     /// Returns the ground of a scene in a system. Heights count from `geoid`.
-    ///
-    /// # Errors
-    /// [`NotPlaced::System`] if the system does not lead to the globe.
-    pub fn new(extras: &'a Extras, system: GlobeSystem, geoid: Geoid) -> Result<Ground<'a>, NotPlaced> {
-        let globe = Globe::new(system, extras.metres_per_unit, geoid)?;
-        Ok(Ground { extras, globe, base: extras.offset[2] * extras.metres_per_unit_z })
+    pub fn new(extras: &'a Extras, system: GlobeSystem, geoid: Geoid) -> Ground<'a> {
+        let globe = Globe::new(system, extras.metres_per_unit, geoid);
+        Ground { extras, globe, base: extras.offset[2] * extras.metres_per_unit_z }
     }
 
     /// Returns the metres that are added to heights at a lattice point.

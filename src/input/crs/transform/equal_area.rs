@@ -1,4 +1,4 @@
-//! Projections of equal area: Albers' conic and Lambert's azimuthal one.
+//! Projections of equal area: Albers' conic, and Lambert's azimuthal and cylindrical ones.
 
 use crate::input::crs::transform::ellipsoid::{Ellipsoid, sin_cos};
 
@@ -103,5 +103,30 @@ impl LambertAzimuthal {
         let sin = ahead * sin_0 + north * cos_0;
         let latitude = self.ellipsoid.latitude_of_authalic(sin * self.pole)?;
         Some([libm::atan2(east, ahead * cos_0 - north * sin_0), latitude])
+    }
+}
+
+/// Lambert's cylindrical projection (EPSG method 9835) without false origin.
+#[derive(Clone, Debug)]
+pub(crate) struct LambertCylindrical {
+    ellipsoid: Ellipsoid,
+    /// Metres on the map for a radian of longitude, and for q.
+    size: [f64; 2],
+}
+
+impl LambertCylindrical {
+    /// Returns the projection that is true to scale at a parallel; `None` if that is a pole.
+    pub(crate) fn new(ellipsoid: Ellipsoid, parallel: f64) -> Option<LambertCylindrical> {
+        let scale = ellipsoid.parallel(sin_cos(parallel));
+        (scale > 1e-6)
+            .then(|| LambertCylindrical { ellipsoid, size: [ellipsoid.a * scale, ellipsoid.a / (2.0 * scale)] })
+    }
+
+    pub(crate) fn forward(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
+        Some([self.size[0] * longitude, self.size[1] * self.ellipsoid.authalic(libm::sin(latitude))])
+    }
+
+    pub(crate) fn inverse(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        Some([x / self.size[0], self.ellipsoid.latitude_of_authalic(y / self.size[1])?])
     }
 }

@@ -3,15 +3,21 @@
 use crate::input::crs::projection::Projection;
 use crate::input::crs::projection_names::WEB_MERCATOR;
 use crate::input::crs::transform::ellipsoid::Ellipsoid;
-use crate::input::crs::transform::equal_area::{Albers, LambertAzimuthal};
+use crate::input::crs::transform::equal_area::{Albers, LambertAzimuthal, LambertCylindrical};
+use crate::input::crs::transform::krovak::Krovak;
 use crate::input::crs::transform::lambert_conic::LambertConic;
 use crate::input::crs::transform::mercator::Mercator;
+use crate::input::crs::transform::meridian_arc::{Cassini, Polyconic};
+use crate::input::crs::transform::oblique_mercator::ObliqueMercator;
 use crate::input::crs::transform::stereographic::{ObliqueStereographic, PolarStereographic};
 use crate::input::crs::transform::transverse_mercator::TransverseMercator;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Radians of a degree.
 pub(crate) const DEGREE: f64 = PI / 180.0;
+
+/// The transverse Mercator projection with axes to the west and south, as in the south of Africa.
+const SOUTH: &str = "tmerc south";
 
 /// No coordinate of a map is greater, in metres: the way round the earth.
 const FARTHEST: f64 = 4.1e7;
@@ -27,8 +33,13 @@ enum Method {
     Mercator(Mercator),
     Albers(Albers),
     LambertAzimuthal(LambertAzimuthal),
+    LambertCylindrical(LambertCylindrical),
     PolarStereographic(PolarStereographic),
     ObliqueStereographic(ObliqueStereographic),
+    ObliqueMercator(ObliqueMercator),
+    Krovak(Krovak),
+    Cassini(Cassini),
+    Polyconic(Polyconic),
 }
 
 /// A projection with its central meridian and its false origin.
@@ -38,6 +49,8 @@ pub(crate) struct MapProjection {
     label: String,
     /// Radians east of the prime meridian.
     meridian: f64,
+    /// 1 if x grows to the east and y to the north, -1 if they grow to the west and south.
+    direction: f64,
     /// Metres.
     false_origin: [f64; 2],
 }
@@ -53,9 +66,7 @@ impl MapProjection {
         if let Some(odd) = projection.names().find(is_odd) {
             return Err(format!("the parameter {odd} of its projection ({label}) is not known here"));
         }
-        if projection.has_other_axes() {
-            return Err("its x grows to the west, or its y to the south".into());
-        }
+        let direction = direction(projection)?;
         if has_two_scales(projection) {
             return Err(format!(
                 "it gives two standard parallels and the scale factor {} beside them, and programs do not agree what that means",
@@ -64,7 +75,8 @@ impl MapProjection {
         }
         let method = method(projection, ellipsoid).ok_or_else(|| format!("its projection is {label}"))?;
         let meridian = projection.value("lon_0") * DEGREE;
-        Ok(MapProjection { method, label: label.replace('_', " "), meridian, false_origin: projection.false_origin() })
+        let (label, false_origin) = (label.replace('_', " "), projection.false_origin());
+        Ok(MapProjection { method, label, meridian, direction, false_origin })
     }
 
     /// Returns what the text calls the method.
@@ -84,24 +96,35 @@ impl MapProjection {
             Method::Mercator(method) => method.forward(place),
             Method::Albers(method) => method.forward(place),
             Method::LambertAzimuthal(method) => method.forward(place),
+            Method::LambertCylindrical(method) => method.forward(place),
             Method::PolarStereographic(method) => method.forward(place),
             Method::ObliqueStereographic(method) => method.forward(place),
+            Method::ObliqueMercator(method) => method.forward(place),
+            Method::Krovak(method) => method.forward(place),
+            Method::Cassini(method) => method.forward(place),
+            Method::Polyconic(method) => method.forward(place),
         };
         let map = map.filter(is_on_map)?;
-        Some([map[0] + self.false_origin[0], map[1] + self.false_origin[1]])
+        Some([0, 1].map(|k| self.direction * map[k] + self.false_origin[k]))
     }
 
     /// Returns the longitude and latitude in radians of x and y in metres; `None` if the projection shows no place there.
     pub(crate) fn inverse(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-        let map = Some([x - self.false_origin[0], y - self.false_origin[1]]).filter(is_on_map)?;
+        let map = [x - self.false_origin[0], y - self.false_origin[1]].map(|value| self.direction * value);
+        let map = Some(map).filter(is_on_map)?;
         let place = match &self.method {
             Method::TransverseMercator(method) => method.inverse(map),
             Method::LambertConic(method) => method.inverse(map),
             Method::Mercator(method) => method.inverse(map),
             Method::Albers(method) => method.inverse(map),
             Method::LambertAzimuthal(method) => method.inverse(map),
+            Method::LambertCylindrical(method) => method.inverse(map),
             Method::PolarStereographic(method) => method.inverse(map),
             Method::ObliqueStereographic(method) => method.inverse(map),
+            Method::ObliqueMercator(method) => method.inverse(map),
+            Method::Krovak(method) => method.inverse(map),
+            Method::Cassini(method) => method.inverse(map),
+            Method::Polyconic(method) => method.inverse(map),
         };
         let [longitude, latitude] = place?;
         let is_place = longitude.is_finite() && latitude.abs() <= POLE;
@@ -117,16 +140,30 @@ fn method(projection: &Projection, ellipsoid: Ellipsoid) -> Option<Method> {
         return None;
     }
     let parallels = || [angle("lat_1"), angle("lat_2")];
+    let line = || [angle("alpha"), angle("gamma")];
     match projection.method() {
-        "tmerc" => Some(Method::TransverseMercator(TransverseMercator::new(ellipsoid, latitude, scale))),
+        "tmerc" | SOUTH => Some(Method::TransverseMercator(TransverseMercator::new(ellipsoid, latitude, scale))),
         "lcc" => LambertConic::new(ellipsoid, latitude, parallels(), scale).map(Method::LambertConic),
         "aea" => Albers::new(ellipsoid, latitude, parallels()).map(Method::Albers),
         "laea" => Some(Method::LambertAzimuthal(LambertAzimuthal::new(ellipsoid, latitude))),
+        "cea" if latitude == 0.0 => LambertCylindrical::new(ellipsoid, angle("lat_1")).map(Method::LambertCylindrical),
         // Variants with another origin differ in where they count from.
         "merc" if latitude == 0.0 => Some(Method::Mercator(Mercator::new(ellipsoid, scale))),
         WEB_MERCATOR => Some(Method::Mercator(Mercator::web(ellipsoid))),
         "stere" => polar(projection, ellipsoid, latitude, scale).map(Method::PolarStereographic),
         "sterea" => ObliqueStereographic::new(ellipsoid, latitude, scale).map(Method::ObliqueStereographic),
+        "omerc origin" => {
+            ObliqueMercator::around_crossing(ellipsoid, latitude, line(), scale).map(Method::ObliqueMercator)
+        }
+        "omerc centre" => {
+            ObliqueMercator::around_centre(ellipsoid, latitude, line(), scale).map(Method::ObliqueMercator)
+        }
+        // Programs do not agree in which direction a false origin would count.
+        "krovak" if projection.false_origin() == [0.0; 2] => {
+            Krovak::new(ellipsoid, latitude, scale).map(Method::Krovak)
+        }
+        "cass" => Some(Method::Cassini(Cassini::new(ellipsoid, latitude))),
+        "poly" => Some(Method::Polyconic(Polyconic::new(ellipsoid, latitude))),
         _ => None,
     }
 }
@@ -142,11 +179,26 @@ fn polar(projection: &Projection, ellipsoid: Ellipsoid, latitude: f64, scale: f6
     is_polar.then(|| PolarStereographic::with_parallel(ellipsoid, latitude, scale))
 }
 
+/// Returns 1 if x grows to the east and y to the north, -1 if they grow to the west and south, as the method has it.
+fn direction(projection: &Projection) -> Result<f64, String> {
+    match projection.method() {
+        SOUTH if projection.may_go_south_west() => Ok(-1.0),
+        SOUTH => Err("its axes are not those to the west and south of its projection".into()),
+        _ if projection.has_other_axes() => Err("its x grows to the west, or its y to the south".into()),
+        _ => Ok(1.0),
+    }
+}
+
 /// Returns whether the formulas of a method have a place for a parameter.
 fn is_known(method: &str, name: &str) -> bool {
-    let parallels = ["lcc", "aea"].contains(&method) && ["lat_1", "lat_2"].contains(&name);
-    let scale = name == "k_0" && !["aea", "laea", WEB_MERCATOR].contains(&method);
-    parallels || scale || ["lon_0", "lat_0", "x_0", "y_0"].contains(&name)
+    match name {
+        "lon_0" | "lat_0" | "x_0" | "y_0" => true,
+        "lat_1" => ["lcc", "aea", "cea"].contains(&method),
+        "lat_2" => ["lcc", "aea"].contains(&method),
+        "alpha" | "gamma" => ["omerc origin", "omerc centre"].contains(&method),
+        "k_0" => !["aea", "laea", "cea", "cass", "poly", WEB_MERCATOR].contains(&method),
+        _ => false,
+    }
 }
 
 /// Returns whether a cone has two parallels that are true to scale, and a scale as well.

@@ -7,9 +7,13 @@ mod bit_tests;
 pub(crate) mod datum_rule;
 mod ellipsoid;
 mod equal_area;
+mod gauss_sphere;
+mod krovak;
 mod lambert_conic;
 mod map_projection;
 mod mercator;
+mod meridian_arc;
+mod oblique_mercator;
 #[cfg(test)]
 mod refusal_tests;
 mod stereographic;

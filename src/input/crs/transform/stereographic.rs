@@ -1,6 +1,7 @@
 //! Stereographic projections: around a pole, and around any place by way of the conformal sphere.
 
-use crate::input::crs::transform::ellipsoid::{Ellipsoid, secant, sin_cos};
+use crate::input::crs::transform::ellipsoid::{Ellipsoid, sin_cos};
+use crate::input::crs::transform::gauss_sphere::GaussSphere;
 
 /// A polar stereographic projection without false origin.
 #[derive(Clone, Debug)]
@@ -50,13 +51,7 @@ impl PolarStereographic {
 /// The oblique stereographic projection as a double one (EPSG method 9809), without false origin.
 #[derive(Clone, Debug)]
 pub(crate) struct ObliqueStereographic {
-    ellipsoid: Ellipsoid,
-    /// Longitudes on the conformal sphere for those on the ellipsoid.
-    stretch: f64,
-    /// What is added to isometric latitudes on the sphere.
-    shift: f64,
-    /// The sine and the cosine of the origin's latitude on the sphere.
-    origin: [f64; 2],
+    sphere: GaussSphere,
     /// Twice the radius of the sphere, times the scale.
     diameter: f64,
 }
@@ -64,20 +59,13 @@ pub(crate) struct ObliqueStereographic {
 impl ObliqueStereographic {
     /// Returns the projection around a place; `None` if that is a pole.
     pub(crate) fn new(ellipsoid: Ellipsoid, latitude: f64, scale: f64) -> Option<ObliqueStereographic> {
-        let ([sin, cos], e2) = (sin_cos(latitude), ellipsoid.e2);
-        let stretch = (1.0 + e2 * (cos * cos) * (cos * cos) / (1.0 - e2)).sqrt();
-        let radius = ellipsoid.a * (1.0 - e2).sqrt() / (1.0 - e2 * sin * sin);
-        let on_sphere = sin / stretch;
-        let shift = libm::atanh(on_sphere) - stretch * ellipsoid.isometric(latitude);
-        let origin = [on_sphere, ((1.0 - on_sphere) * (1.0 + on_sphere)).sqrt()];
-        let is_place = cos > 1e-6 && shift.is_finite();
-        is_place.then_some(ObliqueStereographic { ellipsoid, stretch, shift, origin, diameter: 2.0 * radius * scale })
+        let sphere = GaussSphere::new(ellipsoid, latitude)?;
+        let diameter = 2.0 * sphere.radius * scale;
+        Some(ObliqueStereographic { sphere, diameter })
     }
 
-    pub(crate) fn forward(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
-        let tangent = libm::sinh(self.stretch * self.ellipsoid.isometric(latitude) + self.shift);
-        let cos = 1.0 / secant(tangent);
-        let (sin, [east, ahead], [sin_0, cos_0]) = (tangent * cos, sin_cos(self.stretch * longitude), self.origin);
+    pub(crate) fn forward(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        let ([[sin, cos], [east, ahead]], [sin_0, cos_0]) = (self.sphere.angles(place), self.sphere.origin);
         let facing = sin * sin_0 + cos * cos_0 * ahead;
         let scale = self.diameter / (1.0 + facing);
         // The half of the earth around the origin.
@@ -93,10 +81,6 @@ impl ObliqueStereographic {
         // The place on the unit sphere, seen from the origin.
         let ahead = (1.0 - square) / (1.0 + square);
         let [east, north] = [u, v].map(|value| 2.0 * value / (1.0 + square));
-        let [sin_0, cos_0] = self.origin;
-        let (sin, outward) = (ahead * sin_0 + north * cos_0, ahead * cos_0 - north * sin_0);
-        let isometric = (libm::asinh(sin / libm::hypot(east, outward)) - self.shift) / self.stretch;
-        let longitude = libm::atan2(east, outward) / self.stretch;
-        Some([longitude, self.ellipsoid.latitude_of_isometric(isometric)])
+        Some(self.sphere.place(self.sphere.origin, [ahead, east, north]))
     }
 }

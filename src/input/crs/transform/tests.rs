@@ -38,6 +38,14 @@ fn published_values_are_met_and_found_again() {
         (4326, 3032, [120.0, -75.0], [7_255_380.79, 7_053_389.56]),
         // Oblique stereographic: the Netherlands.
         (4289, 28992, [6.0, 53.0], [196_105.283, 557_057.739]),
+        // Hotine's oblique Mercator, variant B: Borneo.
+        (4298, 29873, [angle(115.0, 48.0, 19.8196), angle(5.0, 23.0, 14.1129)], [679_245.73, 596_562.78]),
+        // Krovak. The note has southings and westings, and 1050538.643 by constants with fewer digits.
+        (4156, 5514, [angle(16.0, 50.0, 59.179), angle(50.0, 12.0, 32.442)], [-568_990.995, -1_050_538.631]),
+        // Cassini and Soldner: Trinidad, in links.
+        (4302, 30200, [-62.0, 10.0], [66_644.94, 82_536.22]),
+        // Transverse Mercator with westings and southings: South Africa. The note has 71984.49, for seconds with more digits.
+        (4148, 2053, [angle(28.0, 16.0, 57.479), angle(-25.0, 43.0, 55.302)], [71_984.480, 2_847_342.735]),
     ];
     for (base, code, place, expected) in examples {
         let (base, map) = (epsg(base), epsg(code));
@@ -47,6 +55,26 @@ fn published_values_are_met_and_found_again() {
         let again = way(&map, &base).apply(found).unwrap();
         let off = (again[0] - place[0]).abs().max((again[1] - place[1]).abs());
         assert!(off < 1e-13 * 180.0, "EPSG:{code}: {again:?} {place:?}");
+    }
+}
+
+#[test]
+fn snyders_examples_are_met() {
+    // "Map Projections: A Working Manual", pages 282 and 304, on the ellipsoid of Clarke.
+    let base = epsg(4267);
+    let map = |projection: &str| {
+        let text = base.wkt.clone().unwrap();
+        parse(&format!(r#"PROJCS["s",{text},PROJECTION{projection},UNIT["metre",1]]"#)).unwrap()
+    };
+    let cylinder =
+        map(r#"["Cylindrical_Equal_Area"],PARAMETER["standard_parallel_1",5],PARAMETER["central_meridian",-75]"#);
+    let cones = map(r#"["Polyconic"],PARAMETER["latitude_of_origin",30],PARAMETER["central_meridian",-96]"#);
+    for (map, place, expected) in
+        [(cylinder, [-78.0, 5.0], [-332_699.8, 554_248.5]), (cones, [-75.0, 40.0], [1_776_774.5, 1_319_657.8])]
+    {
+        let found = way(&base, &map).apply(place).unwrap();
+        let off = (found[0] - expected[0]).abs().max((found[1] - expected[1]).abs());
+        assert!(off < 0.051, "{found:?}, published {expected:?}");
     }
 }
 
@@ -64,6 +92,17 @@ fn places_are_found_again_all_over_the_area_of_a_projection() {
         (4326, 3031, -180.0, -89.9999, 180.0, -60.0),
         (4289, 28992, 2.0, 49.0, 9.0, 55.0),
         (4258, 3035, -30.0, 25.0, 60.0, 80.0),
+        (4326, 6933, -180.0, -85.0, 180.0, 85.0),
+        (4150, 2056, -10.0, 30.0, 25.0, 60.0),
+        (4237, 23700, 10.0, 40.0, 30.0, 55.0),
+        (4156, 5514, -10.0, 30.0, 60.0, 70.0),
+        (4742, 3375, 90.0, -20.0, 115.0, 25.0),
+        (4298, 29873, 100.0, -20.0, 130.0, 25.0),
+        (4269, 26931, -150.0, 45.0, -120.0, 65.0),
+        (4314, 3068, 0.0, 45.0, 27.0, 60.0),
+        (4302, 30200, -71.0, -5.0, -52.0, 20.0),
+        (4674, 5880, -83.0, -40.0, -25.0, 40.0),
+        (4148, 2053, 19.0, -45.0, 39.0, 10.0),
     ] {
         let (base, map) = (epsg(base), epsg(code));
         let (there, back) = (way(&base, &map), way(&map, &base));
@@ -157,7 +196,10 @@ fn shifts_are_refused_by_name() {
 fn projections_that_are_not_computed_are_refused_by_name() {
     let refused =
         |code: u32, base: u32| CrsTransform::between(&epsg(base), &epsg(code), DatumRule::Strict).unwrap_err();
-    assert!(refused(5514, 4156).contains("Krovak"), "{}", refused(5514, 4156));
+    assert!(refused(27200, 4272).contains("New_Zealand_Map_Grid"), "{}", refused(27200, 4272));
+    // Southings and westings, in this order, and formulas of a sphere.
+    assert!(refused(5513, 4156).contains("its x grows to the west"), "{}", refused(5513, 4156));
+    assert!(refused(3975, 4326).contains("Cylindrical_Equal_Area"), "{}", refused(3975, 4326));
     assert!(refused(4978, 4326).contains("neither a map"));
     let oblique = r#"PROJCS["o",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],
         UNIT["degree",0.0174532925199433]],PROJECTION["Stereographic"],PARAMETER["latitude_of_origin",45],
@@ -169,7 +211,7 @@ fn projections_that_are_not_computed_are_refused_by_name() {
 
 #[test]
 fn no_parameter_and_no_place_leads_to_infinity() {
-    const METHODS: [&str; 9] = [
+    const METHODS: [&str; 15] = [
         "Transverse_Mercator",
         "Lambert_Conformal_Conic_1SP",
         "Lambert_Conformal_Conic_2SP",
@@ -179,6 +221,12 @@ fn no_parameter_and_no_place_leads_to_infinity() {
         "Lambert_Azimuthal_Equal_Area",
         "Polar_Stereographic",
         "Oblique_Stereographic",
+        "Hotine_Oblique_Mercator",
+        "Hotine_Oblique_Mercator_Azimuth_Center",
+        "Krovak",
+        "Cassini_Soldner",
+        "Polyconic",
+        "Cylindrical_Equal_Area",
     ];
     const ODD: [f64; 9] = [0.0, 45.0, 90.0, -90.0, 1e-300, 1e300, -1e300, 1e6, 359.999];
     let earth = epsg(4326);
@@ -188,14 +236,20 @@ fn no_parameter_and_no_place_leads_to_infinity() {
             let has_parallels = method.contains("2SP") || method.starts_with("Albers");
             let parallels =
                 format!(r#"PARAMETER["standard_parallel_1",{latitude}],PARAMETER["standard_parallel_2",{odd}],"#);
-            let has_scale = !has_parallels && !method.contains("Azimuthal");
+            const UNSCALED: [&str; 4] =
+                ["Lambert_Azimuthal_Equal_Area", "Cassini_Soldner", "Polyconic", "Cylindrical_Equal_Area"];
+            let has_scale = !has_parallels && !UNSCALED.contains(method);
+            let line = format!(r#"PARAMETER["azimuth",{odd}],"#);
+            let of_line = if method.starts_with("Hotine") { line.as_str() } else { "" };
+            let parallels = if has_parallels { parallels.as_str() } else { of_line };
             let text = format!(
                 r#"PROJCS["odd",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],
                 UNIT["degree",0.0174532925199433]],PROJECTION["{method}"],PARAMETER["latitude_of_origin",{}],
-                PARAMETER["central_meridian",{odd}],{}PARAMETER["scale_factor",{}],PARAMETER["false_easting",{odd}],UNIT["metre",1]]"#,
-                if method.starts_with("Mercator") { 0.0 } else { latitude },
-                if has_parallels { &parallels } else { "" },
+                PARAMETER["central_meridian",{odd}],{parallels}PARAMETER["scale_factor",{}],PARAMETER["false_easting",{}],
+                UNIT["metre",1]]"#,
+                if method.starts_with("Mercator") || method.starts_with("Cyl") { 0.0 } else { latitude },
                 if has_scale { scale } else { 1.0 },
+                if *method == "Krovak" { 0.0 } else { odd },
             );
             let Ok(there) = CrsTransform::between(&earth, &parse(&text).unwrap(), DatumRule::Strict) else { continue };
             let back = CrsTransform::between(&parse(&text).unwrap(), &earth, DatumRule::Strict).unwrap();

@@ -31,6 +31,30 @@ const NAMED: [(&str, [f64; 7]); 9] = [
     ("OSGB36", [446.448, -125.157, 542.06, 0.1502, 0.247, 0.8421, -20.4894]),
 ];
 
+/// The prime meridians that PROJ has names for, in degrees.
+const MERIDIANS: [(&str, f64); 13] = [
+    ("greenwich", 0.0),
+    ("lisbon", -9.131_906_111),
+    ("paris", 2.337_229_167),
+    ("bogota", -74.080_916_667),
+    ("madrid", -3.687_938_889),
+    ("rome", 12.452_333_333),
+    ("bern", 7.439_583_333),
+    ("jakarta", 106.807_719_444),
+    ("ferro", -17.666_666_667),
+    ("brussels", 4.367_975),
+    ("stockholm", 18.058_277_778),
+    ("athens", 23.716_337_5),
+    ("oslo", 10.722_916_667),
+];
+
+/// A tenth of a metre, in degrees. A meridian in another unit is kilometres off.
+const SAME_MERIDIAN: f64 = 1e-6;
+
+/// What to do with points in a system that is not computed.
+const ELSEWHERE: &str =
+    "transform the points to another CRS first, such as a UTM zone, with the filter `reprojection` of `pdal translate`";
+
 /// The way to the longitude and latitude of WGS 84. The same bits come out on every machine.
 #[derive(Clone, Debug)]
 pub struct GlobeWay {
@@ -43,18 +67,21 @@ pub struct GlobeWay {
 
 impl GlobeWay {
     /// Returns the way from `crs`, whose `definition` in the form of PROJ.4 says what its datum is to WGS 84. Coordinates are in units of
-    /// `metres`. Returns `None` if this program does not compute it.
-    pub fn of(crs: &Crs, definition: &str, metres: f64) -> Option<GlobeWay> {
-        let to_degrees = CrsTransform::to_degrees(crs).ok()?;
-        let form = crs.form()?;
-        form.projection()?;
-        let datum = form.datum()?;
-        // Texts do not agree in what unit they give another meridian than that of Greenwich.
-        if datum.meridian() != 0.0 || definition.contains("+pm=") {
-            return None;
+    /// `metres`.
+    ///
+    /// # Errors
+    /// A sentence if this program does not compute it.
+    pub fn of(crs: &Crs, definition: &str, metres: f64) -> Result<GlobeWay, String> {
+        let to_degrees = CrsTransform::to_degrees(crs).map_err(|why| format!("{why} ({ELSEWHERE})"))?;
+        let form = crs.form().filter(|form| form.projection().is_some());
+        let (form, own) = form.zip(crs.metres_per_unit()).ok_or("it is not a projected system")?;
+        let datum = form.datum().ok_or_else(|| format!("{} does not say its datum", crs.label()))?;
+        if meridian(definition).is_none_or(|east| (east - datum.meridian()).abs() > SAME_MERIDIAN) {
+            return Err(format!("{} and {definition} differ in the prime meridian ({ELSEWHERE})", crs.label()));
         }
-        let ellipsoid = Ellipsoid::of(datum.ellipsoid()?)?;
-        Some(GlobeWay { to_degrees, scale: metres / crs.metres_per_unit()?, shift: Shift::of(definition, ellipsoid)? })
+        let ellipsoid = datum.ellipsoid().and_then(Ellipsoid::of);
+        let ellipsoid = ellipsoid.ok_or_else(|| format!("{} has no ellipsoid", crs.label()))?;
+        Ok(GlobeWay { to_degrees, scale: metres / own, shift: Shift::of(definition, ellipsoid)? })
     }
 
     /// Returns longitude and latitude in radians; `None` if the map has no such place.
@@ -84,23 +111,27 @@ struct Shift {
 }
 
 impl Shift {
-    /// Returns the shift that a definition names, `Some(None)` if it names none; `None` if it is not known here.
-    fn of(definition: &str, from: Ellipsoid) -> Option<Option<Shift>> {
-        let value =
-            |key: &str| definition.split_whitespace().find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
+    /// Returns the shift that a definition names, if it names one.
+    ///
+    /// # Errors
+    /// A sentence if it is not known here. A datum such as NAD27 leads to WGS 84 by a grid alone.
+    fn of(definition: &str, from: Ellipsoid) -> Result<Option<Shift>, String> {
+        let value = |key: &str| value(definition, key);
         let numbers = match (value("+nadgrids"), value("+towgs84"), value("+datum")) {
-            (Some("@null"), ..) | (None, None, None) => return Some(None),
-            (Some(_), ..) => return None,
-            (None, Some(list), _) => seven(list)?,
-            (None, None, Some(name)) => NAMED.iter().find(|(known, _)| *known == name)?.1,
+            (Some("@null"), ..) | (None, None, None) => return Ok(None),
+            (None, Some(list), _) => seven(list).ok_or_else(|| format!("the shift in {definition} cannot be read"))?,
+            (grids, _, name) => {
+                let known = NAMED.iter().find(|(known, _)| grids.is_none() && Some(*known) == name);
+                known.map(|(_, numbers)| *numbers).ok_or_else(|| needs_grid(definition))?
+            }
         };
-        let to = Ellipsoid::of(WGS84)?;
+        let to = Ellipsoid::of(WGS84).ok_or("WGS 84 has no ellipsoid")?;
         if numbers == [0.0; 7] && from.a == to.a && (from.e2 - to.e2).abs() < SAME_SHAPE {
-            return Some(None);
+            return Ok(None);
         }
         let [x, y, z, turn_x, turn_y, turn_z, millionths] = numbers;
         let turns = [turn_x, turn_y, turn_z].map(|seconds| seconds * SECOND);
-        Some(Some(Shift { from, to, metres: [x, y, z], turns, scale: 1.0 + millionths / 1e6 }))
+        Ok(Some(Shift { from, to, metres: [x, y, z], turns, scale: 1.0 + millionths / 1e6 }))
     }
 
     fn apply(&self, [longitude, latitude]: [f64; 2]) -> [f64; 2] {
@@ -124,6 +155,25 @@ impl Shift {
     }
 }
 
+/// Returns the value of a key of a definition.
+fn value<'a>(definition: &'a str, key: &str) -> Option<&'a str> {
+    definition.split_whitespace().find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
+}
+
+/// Returns the prime meridian of a definition in degrees; `None` if it is not known here.
+fn meridian(definition: &str) -> Option<f64> {
+    let Some(name) = value(definition, "+pm") else { return Some(0.0) };
+    let named = MERIDIANS.iter().find(|(known, _)| *known == name).map(|(_, east)| *east);
+    named.or_else(|| name.parse().ok())
+}
+
+fn needs_grid(definition: &str) -> String {
+    format!(
+        "the way from the datum of {definition} to WGS 84 needs a grid, which this program does not have (transform the points to a datum \
+         such as NAD83 first)"
+    )
+}
+
 /// Returns three or seven numbers as seven.
 fn seven(list: &str) -> Option<[f64; 7]> {
     let given = list.split(',').map(|number| number.trim().parse().ok()).collect::<Option<Vec<f64>>>()?;
@@ -139,12 +189,29 @@ fn seven(list: &str) -> Option<[f64; 7]> {
 mod tests {
     use super::*;
     use crate::input::crs::from_wkt::from_epsg;
+    use crate::input::crs::system::CrsKind;
     use proj4rs::{Proj, transform::transform};
+    use std::collections::BTreeMap;
 
     fn way(code: u32) -> (GlobeWay, String) {
         let crs = from_epsg(code).unwrap();
         let (definition, metres) = (crs.proj4_definition().unwrap(), crs.metres_per_unit().unwrap());
-        (GlobeWay::of(&crs, &definition, metres).unwrap_or_else(|| panic!("EPSG:{code}: {definition}")), definition)
+        (GlobeWay::of(&crs, &definition, metres).unwrap_or_else(|why| panic!("EPSG:{code}: {why}")), definition)
+    }
+
+    /// Returns how far the way is off another library on places around `at`, in radians.
+    fn off(code: u32, at: [f64; 2]) -> f64 {
+        let (way, definition) = way(code);
+        let [from, to] =
+            [definition.as_str(), "+proj=longlat +datum=WGS84"].map(|d| Proj::from_proj_string(d).unwrap());
+        let off = (0..100).map(|i| {
+            let place = [at[0] + f64::from(i % 10) * 997.0, at[1] - f64::from(i / 10) * 1013.0];
+            let mut theirs = (place[0], place[1], 0.0);
+            transform(&from, &to, &mut theirs).unwrap();
+            let [longitude, latitude] = way.geographic(place).unwrap();
+            (longitude - theirs.0).abs().max((latitude - theirs.1).abs())
+        });
+        off.fold(0.0, f64::max)
     }
 
     #[test]
@@ -164,43 +231,113 @@ mod tests {
             (3413, [100_000.0, -1_500_000.0]),
             (2100, [500_000.0, 4_200_000.0]),
         ] {
-            let (way, definition) = way(code);
-            let [from, to] =
-                [definition.as_str(), "+proj=longlat +datum=WGS84"].map(|d| Proj::from_proj_string(d).unwrap());
-            for i in 0..100 {
-                let place = [at[0] + f64::from(i % 10) * 997.0, at[1] - f64::from(i / 10) * 1013.0];
-                let mut theirs = (place[0], place[1], 0.0);
-                transform(&from, &to, &mut theirs).unwrap();
-                let [longitude, latitude] = way.geographic(place).unwrap();
-                let off = (longitude - theirs.0).abs().max((latitude - theirs.1).abs());
-                // A hundredth of a millimetre.
-                assert!(off < 1.5e-12, "EPSG:{code} {place:?}: {off} radians");
-            }
+            let off = off(code, at);
+            // A hundredth of a millimetre.
+            assert!(off < 1.5e-12, "EPSG:{code}: {off} radians");
+        }
+    }
+
+    #[test]
+    fn oblique_and_other_maps_are_those_of_another_library() {
+        for (code, at) in [
+            (2056, [2_683_000.0, 1_247_000.0]),
+            (21781, [683_000.0, 247_000.0]),
+            (21780, [85_000.0, 47_000.0]),
+            (23700, [650_000.0, 239_000.0]),
+            (5514, [-743_000.0, -1_043_000.0]),
+            (5221, [-743_000.0, -1_043_000.0]),
+            (8353, [-600_000.0, -1_280_000.0]),
+            (3375, [743_000.0, 348_000.0]),
+            (3376, [590_000.0, 553_000.0]),
+            (29873, [590_000.0, 553_000.0]),
+            (26931, [775_000.0, 720_000.0]),
+            (3078, [620_000.0, 280_000.0]),
+            (3068, [24_000.0, 20_000.0]),
+            (30200, [66_000.0, 82_000.0]),
+            (3378, [-4_000.0, -2_000.0]),
+            (5880, [5_754_000.0, 7_395_000.0]),
+            (6933, [1_157_000.0, 5_172_000.0]),
+            (2053, [80_000.0, 2_843_000.0]),
+            (31253, [0.0, 340_000.0]),
+            (20790, [110_000.0, 190_000.0]),
+            (27393, [-1_000.0, 211_000.0]),
+            (21100, [3_500_000.0, 210_000.0]),
+        ] {
+            let off = off(code, at);
+            assert!(off < 1e-11, "EPSG:{code}: {off} radians");
+        }
+        // The text has the meridian of Paris to a third of a millimetre.
+        for (code, at) in [(27572, [600_000.0, 2_427_000.0]), (29702, [513_000.0, 799_000.0])] {
+            let off = off(code, at);
+            assert!(off < 7e-11, "EPSG:{code}: {off} radians");
         }
     }
 
     #[test]
     fn the_bits_are_those_of_every_machine() {
-        let bits = [(27700, [530_000.0, 180_000.0]), (2277, [2_300_000.0, 10_000_000.0])]
-            .map(|(code, place)| way(code).0.geographic(place).unwrap().map(f64::to_bits));
+        let bits = [
+            (27700, [530_000.0, 180_000.0]),
+            (2277, [2_300_000.0, 10_000_000.0]),
+            (2056, [2_683_000.0, 1_247_000.0]),
+            (5514, [-743_000.0, -1_043_000.0]),
+            (27572, [600_000.0, 2_427_000.0]),
+        ]
+        .map(|(code, place)| way(code).0.geographic(place).unwrap().map(f64::to_bits));
         let expected = [
             [13_790_684_007_957_377_804, 4_606_271_919_018_445_997],
             [13_833_936_471_851_274_948, 4_602_907_052_258_766_745],
+            [4_594_536_583_784_806_335, 4_605_621_815_907_048_335],
+            [4_598_205_000_748_869_246, 4_606_049_227_011_466_186],
+            [4_586_037_797_926_763_645, 4_605_853_339_240_275_558],
         ];
         assert_eq!(bits, expected);
     }
 
+    /// Returns why there is no way.
+    fn refused(code: u32, definition: &str) -> String {
+        GlobeWay::of(&from_epsg(code).unwrap(), definition, 1.0).err().unwrap()
+    }
+
     #[test]
-    fn what_is_not_computed_is_left_to_others() {
-        let krovak = from_epsg(5514).unwrap();
-        assert!(GlobeWay::of(&krovak, "+proj=krovak +towgs84=0,0,0", 1.0).is_none());
-        let british = from_epsg(27700).unwrap();
-        assert!(GlobeWay::of(&british, "+proj=tmerc +nadgrids=OSTN15.gsb", 1.0).is_none());
-        assert!(GlobeWay::of(&british, "+proj=tmerc +towgs84=1,2", 1.0).is_none());
-        assert!(GlobeWay::of(&from_epsg(4326).unwrap(), "+proj=longlat", 1.0).is_none());
-        // A map that counts from Paris.
-        let french = from_epsg(27572).unwrap();
-        assert!(GlobeWay::of(&french, &french.proj4_definition().unwrap(), 1.0).is_none());
-        assert!(GlobeWay::of(&british, &french.proj4_definition().unwrap(), 1.0).is_none());
+    fn what_is_not_computed_is_refused_by_name() {
+        let southings = refused(5513, "+proj=krovak +towgs84=0,0,0");
+        assert!(southings.contains("S-JTSK / Krovak") && southings.contains("pdal translate"), "{southings}");
+        assert!(refused(27200, "+proj=nzmg").contains("New_Zealand_Map_Grid"));
+        let british = "+proj=tmerc +nadgrids=OSTN15.gsb";
+        assert!(refused(27700, british).contains(&format!("the datum of {british} to WGS 84 needs a grid")));
+        let old = refused(26715, "+proj=utm +zone=15 +datum=NAD27 +units=m +no_defs");
+        assert!(old.contains("needs a grid") && old.contains("NAD27") && old.contains("NAD83"), "{old}");
+        assert!(refused(27700, "+proj=tmerc +towgs84=1,2").contains("cannot be read"));
+        assert!(refused(4326, "+proj=longlat").contains("not a projected system"));
+        // Another meridian than that of the text.
+        for meridian in ["paris", "2.5969213", "unknown"] {
+            let definition = format!("+proj=tmerc +pm={meridian}");
+            assert!(refused(27700, &definition).contains("differ in the prime meridian"), "{meridian}");
+        }
+        assert!(refused(27572, "+proj=lcc").contains("differ in the prime meridian"));
+    }
+
+    #[test]
+    fn of_all_codes_these_are_not_computed() {
+        let codes = (1..=u32::from(u16::MAX)).filter_map(from_epsg).filter(|crs| crs.kind == CrsKind::Projected);
+        let mut reasons: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+        for crs in codes {
+            let Some((definition, metres)) = crs.proj4_definition().zip(crs.metres_per_unit()) else { continue };
+            let why = GlobeWay::of(&crs, &definition, metres).err().filter(|why| !why.contains("needs a grid"));
+            if let Some(why) = why {
+                let (_, reason) = why.split_once(": ").unwrap();
+                let reason = reason.split_once(" (").map_or(reason, |(reason, _)| reason).to_string();
+                reasons.entry(reason).or_default().push(crs.epsg.unwrap());
+            }
+        }
+        let expected = [
+            ("its projection is Equirectangular", &[3786, 4087, 4088, 32662, 32663][..]),
+            ("its projection is New_Zealand_Map_Grid", &[27200]),
+            ("its x grows to the west, or its y to the south", &[2065, 5513, 8352]),
+            // Laborde's projection, and that of Belgium with a cone that is turned.
+            ("the parameter alpha of its projection", &[8441]),
+            ("the parameter lat_1 of its projection", &[31300]),
+        ];
+        assert_eq!(reasons, expected.map(|(reason, codes)| (reason.to_string(), codes.to_vec())).into());
     }
 }
