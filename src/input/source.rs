@@ -39,6 +39,7 @@ use crate::{Error, Result, Warnings};
 
 mod crs_origin;
 mod geocentric;
+mod likely;
 mod nodata;
 mod transformed;
 
@@ -311,11 +312,20 @@ impl Source {
         Ok(())
     }
 
-    /// Takes over where the others lie, and what to do about the outliers of a binary file.
+    /// Takes over where the others lie, and what to do about the outliers.
     pub fn set_remedy(&mut self, remedy: &str) {
-        if let Some(measured) = &mut self.measured {
-            measured.remedy = remedy.into();
+        match (&mut self.points, &mut self.measured) {
+            (PointData::Text(table), _) => table.set_remedy(remedy),
+            (_, Some(measured)) => measured.remedy = remedy.into(),
+            (_, None) => {}
         }
+    }
+
+    /// Returns the box of the points that the job wants, outliers included, as far as it is known without decoding.
+    pub fn box_with_outliers(&self) -> Option<[[f64; 3]; 2]> {
+        let PointData::Text(table) = &self.points else { return self.measured.as_ref()?.all };
+        let own = table.box_with_outliers()?;
+        self.transform.as_ref().map_or(Some(own), |transform| transform.around(own))
     }
 
     /// Returns the number of points that the job wants, outliers included; of a binary file that was not looked at, that of all records.
@@ -324,6 +334,16 @@ impl Source {
             PointData::Text(table) => table.wanted_rows(),
             _ => self.measured.as_ref().map_or(self.records, |measured| measured.points),
         }
+    }
+
+    /// Returns what messages call the record of this number: its line in a text, or else the number itself, from 0.
+    ///
+    /// # Errors
+    /// `Io` if the file cannot be read.
+    pub fn record_name(&self, number: u64) -> Result<String> {
+        let PointData::Text(table) = &self.points else { return Ok(format!("point {number}")) };
+        let file = RandomAccessFile::reopen(&self.path, self.size)?;
+        Ok(format!("line {}", table.line_of(&file, number)?))
     }
 
     /// Returns how far the row of a text lies from the middle of all that lies farthest from it, and a description of it.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::crs::unit::Unit;
 use crate::input::file::random_access::RandomAccessFile;
-use crate::input::points::axis::{AXIS_NAMES, Axis};
+use crate::input::points::axis::Axis;
 use crate::input::points::kept_heights::KeptHeights;
 use crate::input::points::nodata::{DoubtfulHeight, SharedHeight, left_out};
 use crate::input::points::record_sink::RecordSink;
@@ -23,7 +23,7 @@ use crate::input::text::nodata_rows::NodataRows;
 use crate::input::text::noise_warning::noise_warning;
 use crate::input::text::number::{MOST_DECIMALS, POWERS};
 use crate::input::text::options::TextOptions;
-use crate::input::text::outliers::{Middle, Outliers, middle, plausible_box};
+use crate::input::text::outliers::{Middle, Outliers, plausible_box, sampled_places};
 use crate::input::text::role::ColumnRole;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
@@ -71,6 +71,9 @@ pub(crate) struct TextTable {
     outliers: Outliers,
     /// The first chunk with outliers: the message about one of them says what to do.
     first_outlier_in: Option<usize>,
+    /// What it says: where the other rows lie, and what to do.
+    #[serde(default)]
+    remedy: String,
     /// The heights that stand for nodata.
     nodata: NodataRows,
     /// A height that may.
@@ -187,6 +190,7 @@ impl TextTable {
             without_outliers: None,
             outliers: Outliers::default(),
             first_outlier_in: None,
+            remedy: String::new(),
             nodata,
             doubtful_height,
             bounds: choice.bounds,
@@ -219,12 +223,17 @@ impl TextTable {
 
     /// Returns where most rows lie; `None` if there are too few rows to tell.
     fn middle(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Option<Middle>> {
+        Ok(Middle::of(self.sampled_places(file, choice)?))
+    }
+
+    /// Returns the places of some of the rows that `choice` wants, in the units of the file.
+    pub(crate) fn sampled_places(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Vec<[f64; 3]>> {
         let chunks = self.chunk_count() as u64;
         let sampled: Vec<Range<u64>> = (0..SAMPLED_CHUNKS.min(chunks))
             .map(|index| chunk_range(&self.rows, index * chunks / SAMPLED_CHUNKS.min(chunks)))
             .collect();
         let wanted = Wanted { choice, nodata: &self.nodata, within: None };
-        middle(file, &self.columns, self.rows.start, &sampled, wanted)
+        sampled_places(file, &self.columns, self.rows.start, &sampled, wanted)
     }
 
     /// Finds the rows that lie so far from all others that they are mistakes, if they are few, and leaves them out: decoding counts them
@@ -291,6 +300,21 @@ impl TextTable {
         Ok(farthest)
     }
 
+    /// Returns the number of the line, from 1, on which a row stands. Rows count from 0; lines without one lie between them.
+    pub(crate) fn line_of(&self, file: &RandomAccessFile, row: u64) -> Result<u64> {
+        let chunk = self.chunks.partition_point(|start| start.row <= row).saturating_sub(1);
+        let Some(&ChunkStart { row: mut next, line: first }) = self.chunks.get(chunk) else { return Ok(row) };
+        let mut found = first;
+        for_each_line(file, self.rows.start, chunk_range(&self.rows, chunk as u64), |index, line| {
+            if !matches!(line, TextLine::Whole(line) if self.columns.skips(line)) {
+                found = if next == row { first + index } else { found };
+                next += 1;
+            }
+            Ok(())
+        })?;
+        Ok(found)
+    }
+
     /// Returns a height that may stand for nodata.
     pub(crate) fn doubtful_height(&self) -> Option<&DoubtfulHeight> {
         self.doubtful_height.as_ref().filter(|_| self.outliers() == 0)
@@ -299,6 +323,16 @@ impl TextTable {
     /// Returns the number of rows that the job wants, apart from those that are left out.
     pub(crate) fn wanted_rows(&self) -> u64 {
         self.wanted.rows
+    }
+
+    /// Returns the box of all rows that the job wants, outliers included.
+    pub(crate) fn box_with_outliers(&self) -> Option<[[f64; 3]; 2]> {
+        self.wanted.bounds.map(|bounds| [bounds.min, bounds.max])
+    }
+
+    /// Has the message about the first outlier say this as well.
+    pub(crate) fn set_remedy(&mut self, remedy: &str) {
+        self.remedy = remedy.into();
     }
 
     fn held(&self) -> &WantedRows {
@@ -392,7 +426,7 @@ impl TextTable {
                     }
                     (Ok(()), Some(within)) if !within.holds(&reader.numbers) => {
                         filter.push_outlier(reader.class(), reader.pulse_return(), || {
-                            let what = if explained { String::new() } else { far_from(within) };
+                            let what = if explained { "" } else { self.remedy.as_str() };
                             explained = true;
                             format!("line {}: {} lies far from all other rows{what}", number(), shown(line))
                         });
@@ -426,18 +460,6 @@ impl TextTable {
         let bytes = (end - start) as u128 * records.min(rows) as u128 / rows.max(1) as u128;
         if records < rows { start..start + bytes as u64 } else { start..end }
     }
-}
-
-/// Returns what to say about the first outlier.
-fn far_from(RowBox { min, max }: &RowBox) -> String {
-    let axis = |axis: usize| format!("{} from {} to {}", AXIS_NAMES[axis], min[axis], max[axis]);
-    format!(
-        " ({}, {}, {}), and no lattice holds both at full precision: leave such rows out with [input] bounds or \
-         max_malformed_fraction, or set resolution or resolution_z so coarse that they fit",
-        axis(0),
-        axis(1),
-        axis(2)
-    )
 }
 
 /// Fails if x and y are so small that they are not told apart by the decimals that are kept.

@@ -58,7 +58,9 @@ impl JobHeights<'_> {
             };
             read += if can_read { records } else { 0 };
             let found = heights_apart(&bins.groups(), self.scale());
-            warnings.extend(found.map(|found| self.sentence(source, &found, sampled)));
+            if let Some(found) = found {
+                warnings.push(self.sentence(source, &found, sampled)?);
+            }
         }
         warnings.extend(self.flat_file());
         Ok(warnings)
@@ -106,32 +108,31 @@ impl JobHeights<'_> {
         (0..source.chunks()).into_par_iter().map(look).try_reduce(empty, |a, b| Ok(a.and(b)))
     }
 
-    fn sentence(&self, source: &Source, found: &HeightsApart, sampled: Option<usize>) -> String {
+    fn sentence(&self, source: &Source, found: &HeightsApart, sampled: Option<usize>) -> Result<String> {
         let value = |height: i64| own_height(source, self.lattice, height);
         let range = |group: &HeightGroup| range_text([group.low, group.high].map(value));
-        let record = if source.format == FileFormat::Text { "row" } else { "point" };
         let apart = |group: &HeightGroup| {
             let (points, has) = if group.count == 1 { ("point", "has") } else { ("points", "have") };
-            match (sampled, group.count) {
+            Ok(match (sampled, group.count) {
                 (Some(_), count) => format!("{count} {points} {has} {}", range(group)),
-                (None, 1) => format!("{record} {} has {}", group.first, range(group)),
+                (None, 1) => format!("{} has {}", source.record_name(group.first)?, range(group)),
                 (None, count) => {
-                    format!("{count} points have {} (the first is {record} {})", range(group), group.first)
+                    format!("{count} points have {} (the first is {})", range(group), source.record_name(group.first)?)
                 }
-            }
+            })
         };
-        let parts: Vec<String> = found.below.iter().chain(&found.above).map(apart).collect();
+        let parts = found.below.iter().chain(&found.above).map(apart).collect::<Result<Vec<String>>>()?;
         let of = sampled.map_or(String::new(), |count| format!("of a sample of {count} points, "));
         let others = found.others;
         let [low, high] = rounded([others.low, others.high].map(value));
-        format!(
+        Ok(format!(
             "{}: {of}{}, far from all others, which lie between {} and {}: they may be mistakes, or stand for nodata; [input] heights = \
              [{low}, {high}] leaves them out",
             source.path.display(),
             parts.join(", and "),
             value(others.low),
             value(others.high)
-        )
+        ))
     }
 
     /// Returns a warning about the first file that claims one height, far below those of all files around it or far above.
