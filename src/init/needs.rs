@@ -120,9 +120,10 @@ fn damage(plan: &Plan) -> Result<Option<Damage>> {
         return Ok(None);
     }
     let worst = plan.inputs.iter().zip(&counts).max_by_key(|(_, counts)| counts.malformed);
-    Ok(worst.map(|(input, counts)| {
+    Ok(worst.map(|(input, of_worst)| {
         let source: &Source = &input.source;
-        Damage { malformed, records: plan.records, error: stop_at(source, counts, malformed, plan.records) }
+        let others = plan.inputs.iter().zip(&counts).map(|(input, counts)| (&input.source, counts.malformed));
+        Damage { malformed, records: plan.records, error: stop_at(source, of_worst, others, [malformed, plan.records]) }
     }))
 }
 

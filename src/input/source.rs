@@ -39,6 +39,7 @@ use crate::{Error, Result, Warnings};
 
 mod crs_origin;
 mod geocentric;
+mod likely;
 mod nodata;
 mod transformed;
 
@@ -316,17 +317,15 @@ impl Source {
         match (&mut self.points, &mut self.measured) {
             (PointData::Text(table), _) => table.set_remedy(remedy),
             (_, Some(measured)) => measured.remedy = remedy.into(),
-            _ => {}
+            (_, None) => {}
         }
     }
 
-    /// Returns the box of the points that the job wants, outliers included, as far as they were looked at.
+    /// Returns the box of the points that the job wants, outliers included, as far as it is known without decoding.
     pub fn box_with_outliers(&self) -> Option<[[f64; 3]; 2]> {
-        match &self.points {
-            // That of a text is in its own system.
-            PointData::Text(table) => table.box_with_outliers().filter(|_| self.transform.is_none()),
-            _ => self.measured.as_ref()?.all,
-        }
+        let PointData::Text(table) = &self.points else { return self.measured.as_ref()?.all };
+        let own = table.box_with_outliers()?;
+        self.transform.as_ref().map_or(Some(own), |transform| transform.around(own))
     }
 
     /// Returns the number of points that the job wants, outliers included; of a binary file that was not looked at, that of all records.
@@ -335,6 +334,16 @@ impl Source {
             PointData::Text(table) => table.wanted_rows(),
             _ => self.measured.as_ref().map_or(self.records, |measured| measured.points),
         }
+    }
+
+    /// Returns what messages call the record of this number: its line in a text, or else the number itself, from 0.
+    ///
+    /// # Errors
+    /// `Io` if the file cannot be read.
+    pub fn record_name(&self, number: u64) -> Result<String> {
+        let PointData::Text(table) = &self.points else { return Ok(format!("point {number}")) };
+        let file = RandomAccessFile::reopen(&self.path, self.size)?;
+        Ok(format!("line {}", table.line_of(&file, number)?))
     }
 
     /// Returns how far the row of a text lies from the middle of all that lies farthest from it, and a description of it.

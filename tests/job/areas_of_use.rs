@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use crate::coordinate_systems::{code, keys, move_to, text, warnings, write};
-use crate::program::Job;
+use crate::program::{Job, number};
 
 /// Writes a table of rows around a place.
 fn csv(folder: &TempDir, name: &str, [x, y]: [f64; 2], step: f64) -> PathBuf {
@@ -258,4 +258,55 @@ fn longitudes_beyond_180_degrees_are_taken_without_whole_turns_and_with_a_warnin
         "{turned}"
     );
     assert!(!warnings(&west).contains("whole turns"), "{west}");
+}
+
+#[test]
+fn a_far_row_does_not_choose_the_zone_and_the_bounds_against_it_are_those_of_the_target() {
+    let folder = tempfile::tempdir().unwrap();
+    for (place, far, zone) in [([11.5, 47.9], "0,0,0", "32N"), ([-121.5, 38.0], "121.5,38,0", "10N")] {
+        let path = csv(&folder, "far.csv", place, 1e-4);
+        let clean = fs::read_to_string(&path).unwrap();
+        let at = clean.match_indices('\n').nth(3).unwrap().0;
+        fs::write(&path, format!("{}\n{far}{}", &clean[..at], &clean[at..])).unwrap();
+        let job =
+            |line: &str| Job::on(&[&path]).with("input", &format!("crs = \"EPSG:4326\"\nto_crs = \"utm\"\n{line}"));
+        let system = format!("WGS 84 / UTM zone {zone}");
+        let refused = job("").run();
+        refused.refused(3, &[&format!("line 5: \"{far}\" lies far from all other rows (in {system}")]);
+        // The bounds of the message are a cure.
+        let from = refused.err.find("bounds = [").unwrap();
+        let bounds = &refused.err[from..=from + refused.err[from..].find(']').unwrap()];
+        for (line, malformed) in [(bounds, 0), ("max_malformed_fraction = 0.1", 1)] {
+            let report = job(line).report();
+            assert!(report["crs"].as_str().unwrap().starts_with(&system), "{report}");
+            assert_eq!((number(&report["points"]["kept"]), number(&report["points"]["malformed"])), (60, malformed));
+        }
+    }
+}
+
+#[test]
+fn a_cure_brings_one_of_several_files_to_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let others = [0.0, 200.0].map(|east| csv(&folder, &format!("{east}.csv"), [450_400.0 + east, 4_500_100.0], 7.0));
+    for (name, place, step, words) in [
+        (
+            "scale.csv",
+            [45_050.0, 450_010.0],
+            0.7,
+            "Multiplied by 10, they lie beside those of the other files: the decimal point",
+        ),
+        ("exchanged.csv", [4_500_100.0, 450_500.0], 7.0, "With x and y exchanged, they lie within it"),
+    ] {
+        let file = csv(&folder, name, place, step);
+        let job = |lines: &str| {
+            Job::on(&[&others[0], &file, &others[1]]).with("input", &format!("crs = \"EPSG:32633\"\n{lines}"))
+        };
+        let words = [name, "outside its area of use", words];
+        job("").run().refused(3, &words);
+        job("").run_with(&["check"]).refused(3, &words);
+    }
+    // Alone, x and y may be exchanged.
+    let alone = csv(&folder, "alone.csv", [45_050.0, 450_010.0], 0.7);
+    let said = Job::on(&[&alone]).with("input", "crs = \"EPSG:32633\"").run();
+    assert!((said.out + &said.err).contains("With x and y exchanged"), "{}", said.err);
 }

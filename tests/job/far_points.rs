@@ -205,6 +205,33 @@ fn a_few_points_that_stretch_the_area_are_told_with_the_bounds_of_the_others() {
 }
 
 #[test]
+fn a_handful_of_points_stretches_a_sparse_survey_and_a_benchmark_does_not() {
+    let warnings = |path: &PathBuf| Job::on(&[path]).report()["warnings"].to_string();
+    for (far, is_told) in [(500_000, true), (60_000, false)] {
+        let cloud = Far::of(near(300, 8000), &[[far, 100, 100]], 34, Header::All, 2);
+        let said = warnings(&cloud.path);
+        assert_eq!(said.contains("1 point (the first is point 34 of "), is_told, "{said}");
+        // The same as text, below a header and a blank line.
+        let mut places = near(300, 8000);
+        places.insert(34, [far, 100, 100]);
+        let row = |[x, y, z]: &[i32; 3]| format!("{x},{y},{z}\n");
+        let path = cloud.path.with_file_name("sparse.csv");
+        fs::write(&path, format!("x,y,z\n\n{}", places.iter().map(row).collect::<String>())).unwrap();
+        let said = warnings(&path);
+        assert_eq!(said.contains("1 point (the first is line 37 of "), is_told, "{said}");
+    }
+}
+
+#[test]
+fn malformed_records_of_other_files_are_named() {
+    let clouds = [40, 200, 300].map(|at| Far::new(500, &[ZERO], at, Header::All));
+    let job = Job::on(&[&clouds[0].path, &clouds[1].path, &clouds[2].path]);
+    let words = ["3 of 1503 records are malformed", "; 2 more in ", "cloud.las and 1 other file. Repair"];
+    job.run().refused(3, &words);
+    job.run_with(&["check"]).refused(3, &words);
+}
+
+#[test]
 fn strips_and_areas_apart_are_not_stretched() {
     let strip = |count: i32| (0..count).map(|i| [i * 50, i % 40 * 20, i % 7]).collect::<Vec<_>>();
     let two: Vec<[i32; 3]> =

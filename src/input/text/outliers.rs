@@ -110,15 +110,14 @@ pub(crate) fn plausible_box(middle: &RowBox, steps: f64) -> Option<RowBox> {
     (widest > 0.0).then(|| RowBox { min: beside(middle.min, -1.0), max: beside(middle.max, 1.0) })
 }
 
-/// Returns where most rows lie, by a sample of the wanted rows in these chunks, given as byte ranges; `None` if
-/// there are too few rows to tell.
-pub(crate) fn middle(
+/// Returns the places of a sample of the wanted rows in these chunks, given as byte ranges.
+pub(crate) fn sampled_places(
     file: &RandomAccessFile,
     columns: &Columns,
     first: u64,
     chunks: &[Range<u64>],
     wanted: Wanted,
-) -> Result<Option<Middle>> {
+) -> Result<Vec<[f64; 3]>> {
     let mut places: Vec<[f64; 3]> = Vec::new();
     for chunk in chunks {
         let mut lines = 0;
@@ -140,5 +139,5 @@ pub(crate) fn middle(
             Ok(())
         })?;
     }
-    Ok(Middle::of(places))
+    Ok(places)
 }

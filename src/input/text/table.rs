@@ -23,7 +23,7 @@ use crate::input::text::nodata_rows::NodataRows;
 use crate::input::text::noise_warning::noise_warning;
 use crate::input::text::number::{MOST_DECIMALS, POWERS};
 use crate::input::text::options::TextOptions;
-use crate::input::text::outliers::{Middle, Outliers, middle, plausible_box};
+use crate::input::text::outliers::{Middle, Outliers, plausible_box, sampled_places};
 use crate::input::text::role::ColumnRole;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
@@ -72,6 +72,7 @@ pub(crate) struct TextTable {
     /// The first chunk with outliers: the message about one of them says what to do.
     first_outlier_in: Option<usize>,
     /// Where the other rows lie, and what to do about the outliers.
+    #[serde(default)]
     remedy: String,
     /// The heights that stand for nodata.
     nodata: NodataRows,
@@ -222,12 +223,17 @@ impl TextTable {
 
     /// Returns where most rows lie; `None` if there are too few rows to tell.
     fn middle(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Option<Middle>> {
+        Ok(Middle::of(self.sampled_places(file, choice)?))
+    }
+
+    /// Returns the places of some of the rows that `choice` wants, in the units of the file.
+    pub(crate) fn sampled_places(&self, file: &RandomAccessFile, choice: &RowChoice) -> Result<Vec<[f64; 3]>> {
         let chunks = self.chunk_count() as u64;
         let sampled: Vec<Range<u64>> = (0..SAMPLED_CHUNKS.min(chunks))
             .map(|index| chunk_range(&self.rows, index * chunks / SAMPLED_CHUNKS.min(chunks)))
             .collect();
         let wanted = Wanted { choice, nodata: &self.nodata, within: None };
-        middle(file, &self.columns, self.rows.start, &sampled, wanted)
+        sampled_places(file, &self.columns, self.rows.start, &sampled, wanted)
     }
 
     /// Finds the rows that lie so far from all others that they are mistakes, if they are few, and leaves them out: decoding counts them
@@ -299,19 +305,34 @@ impl TextTable {
         &self.heights_of_lines
     }
 
-    /// Takes over where the other rows lie, and what to do about the outliers.
-    pub(crate) fn set_remedy(&mut self, remedy: &str) {
-        self.remedy = remedy.into();
-    }
-
-    /// Returns the box of the rows that the job wants, outliers included.
-    pub(crate) fn box_with_outliers(&self) -> Option<[[f64; 3]; 2]> {
-        self.wanted.bounds.map(|bounds| [bounds.min, bounds.max])
+    /// Returns the number of the line, from 1, on which a row stands. Rows count from 0; lines without one lie between them.
+    pub(crate) fn line_of(&self, file: &RandomAccessFile, row: u64) -> Result<u64> {
+        let chunk = self.chunks.partition_point(|start| start.row <= row).saturating_sub(1);
+        let Some(&ChunkStart { row: mut next, line: first }) = self.chunks.get(chunk) else { return Ok(row) };
+        let mut found = first;
+        for_each_line(file, self.rows.start, chunk_range(&self.rows, chunk as u64), |index, line| {
+            if !matches!(line, TextLine::Whole(line) if self.columns.skips(line)) {
+                found = if next == row { first + index } else { found };
+                next += 1;
+            }
+            Ok(())
+        })?;
+        Ok(found)
     }
 
     /// Returns the number of rows that the job wants, apart from those that are left out.
     pub(crate) fn wanted_rows(&self) -> u64 {
         self.wanted.rows
+    }
+
+    /// Returns the box of all rows that the job wants, outliers included.
+    pub(crate) fn box_with_outliers(&self) -> Option<[[f64; 3]; 2]> {
+        self.wanted.bounds.map(|bounds| [bounds.min, bounds.max])
+    }
+
+    /// Has the message about the first outlier say this as well.
+    pub(crate) fn set_remedy(&mut self, remedy: &str) {
+        self.remedy = remedy.into();
     }
 
     fn held(&self) -> &WantedRows {

@@ -126,14 +126,16 @@ fn create(parts: &Parts, directory: &JobDirectory, reader: PartIndex, part: Part
 /// [`Error::Input`] names the first file with such records.
 pub fn check_malformed<'a>(plan: &Plan, read: impl Iterator<Item = &'a ReadInputs> + Clone) -> Result<()> {
     let malformed = read.clone().map(|inputs| inputs.summary.counts.malformed).sum();
-    let first = read.filter_map(|inputs| inputs.malformed.as_ref()).next();
+    let mut bad = read.filter_map(|inputs| inputs.malformed.as_ref());
+    let first = bad.next();
     match first {
         // Where bad files are left out, each is judged by itself.
         Some((input, counts))
             if plan.options.input.on_bad_file == OnBadFile::Stop
                 && malformed > allowed_malformed(plan.options.input.max_malformed_fraction.0, plan.records) =>
         {
-            Err(stop_at(&plan.inputs[*input].source, counts, malformed, plan.records))
+            let others = bad.map(|(input, counts)| (&plan.inputs[*input].source, counts.malformed));
+            Err(stop_at(&plan.inputs[*input].source, counts, others, [malformed, plan.records]))
         }
         _ => Ok(()),
     }

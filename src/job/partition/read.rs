@@ -210,7 +210,7 @@ impl Pass<'_> {
         let allowed = allowed_malformed(options.max_malformed_fraction.0, plan.records);
         match options.on_bad_file {
             OnBadFile::Stop if counts.malformed > 0 && so_far > allowed => {
-                Err(stop_at(&input.source, counts, so_far, plan.records))
+                Err(stop_at(&input.source, counts, std::iter::empty(), [so_far, plan.records]))
             }
             _ => Ok(()),
         }

@@ -4,12 +4,14 @@
 use crate::geometry::lattice::Lattice;
 use crate::input::options::{InputOptions, OutsideCrsArea};
 use crate::input::{AreaOfUse, Crs, CrsKind, CrsTransform, DatumRule, Source, Unit, arc, turned};
-use crate::job::plan::area_cure::{Change, changes};
+use crate::job::plan::area_cure::{Change, changes, scales};
 use crate::job::plan::common_crs::TRANSFORM;
 use crate::job::plan::extent::{Extent, SourceBox};
 use crate::job::plan::height_range::{HeightSample, may_reach};
+use crate::job::plan::point_survey::box_around;
 use crate::{Error, Result, Warnings};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
 
 /// Surveys and zones reach some hundred kilometres beyond the area of use. Farther out, in degrees of arc, there is a warning.
 const DOUBTFUL: f64 = 3.0;
@@ -20,6 +22,12 @@ const HOPELESS: f64 = 6.0;
 /// Neighbouring zones are used to the east and to the west. Where x and y exchanged would fit, so many degrees to the north or south are
 /// enough to be sure.
 const EXCHANGED: f64 = 1.0;
+
+/// The files of one job lie no farther apart than this, in metres: what would bring one of them farther off is no cure.
+const NEAR: f64 = 1e6;
+
+/// A wrong scale is told from others by where it brings a file: so many times the length of all others beside them, or nearer.
+const BESIDE: f64 = 2.0;
 
 /// Kilometres of a degree of arc.
 const DEGREE: f64 = 111.2;
@@ -54,10 +62,13 @@ pub(crate) fn check_places(
         .collect();
     warn_of_long_turns(&places, warnings);
     let mut ways = Ways::default();
-    let outside: Vec<(&Source, Outside)> = places
-        .iter()
-        .filter_map(|(source, places)| Some((*source, outside(source, places, common, &mut ways)?)))
-        .collect();
+    let mut find = |others: Option<&Others>| -> Vec<(&Source, Outside)> {
+        let found = places.iter().map(|(source, places)| (*source, outside(source, places, common, &mut ways, others)));
+        found.filter_map(|(source, found)| Some((source, found?))).collect()
+    };
+    let outside = find(None);
+    let others = Others::than(&outside, sources, common);
+    let outside = if others.is_some() { find(others.as_ref()) } else { outside };
     if options.outside_crs_area == OutsideCrsArea::Stop {
         refuse_hopeless(&outside)?;
     }
@@ -89,8 +100,49 @@ fn warn_of_long_turns(places: &[(&Source, Vec<[f64; 2]>)], warnings: &mut Warnin
 }
 
 /// Returns how the points of a source lie outside the area of a system that they are in, if they do.
-fn outside(source: &Source, places: &[[f64; 2]], common: &CommonPlace, ways: &mut Ways) -> Option<Outside> {
-    systems(source, common).into_iter().find_map(|said| Outside::of(&said, ways.of(&said.crs)?, &said.own(places)?))
+fn outside(
+    source: &Source,
+    places: &[[f64; 2]],
+    common: &CommonPlace,
+    ways: &mut Ways,
+    others: Option<&Others>,
+) -> Option<Outside> {
+    let of = |said: SaidSystem| Outside::of(&said, ways.of(&said.crs)?, &said.own(places)?, others);
+    systems(source, common).into_iter().find_map(of)
+}
+
+/// Where the files lie that are not outside, in the system of the job.
+struct Others {
+    bounds: SourceBox,
+    metres: f64,
+}
+
+impl Others {
+    /// Returns where the files lie that are not among those outside; `None` without any.
+    fn than(outside: &[(&Source, Outside)], sources: &[Source], common: &CommonPlace) -> Option<Others> {
+        if outside.is_empty() {
+            return None;
+        }
+        let outside: HashSet<&Path> = outside.iter().map(|(source, _)| source.path.as_path()).collect();
+        let is_within = |source: &Source| !outside.contains(source.path.as_path());
+        let claims = sources.iter().zip(&common.extent.boxes).filter(|(source, _)| is_within(source));
+        let bounds = box_around(claims.filter_map(|(_, claim)| *claim).flatten())?;
+        Some(Others { bounds, metres: common.metres })
+    }
+
+    /// Returns whether a place lies no farther than this from their box in x and y.
+    fn are_within(&self, distance: f64, place: [f64; 2]) -> bool {
+        let [min, max] = self.bounds;
+        (0..2).all(|axis| place[axis] >= min[axis] - distance && place[axis] <= max[axis] + distance)
+    }
+
+    /// Returns whether a change that brings a point to this place is a cure.
+    fn allow(&self, change: &Change, place: [f64; 2]) -> bool {
+        let [min, max] = self.bounds;
+        let longest = (max[0] - min[0]).max(max[1] - min[1]);
+        let distance = if matches!(change, Change::Scaled(_)) { BESIDE * longest } else { NEAR / self.metres };
+        self.are_within(distance, place)
+    }
 }
 
 /// Fails if a source lies hopelessly far outside. It is no bad file that a job may leave out: what the sample of all files has of one depends
@@ -130,6 +182,14 @@ impl SaidSystem {
         match &self.to_file {
             Some([to_file, _]) if self.is_target => to_file.apply(place),
             _ => Some(place),
+        }
+    }
+
+    /// Returns where a place of the file lies in the system of the job.
+    fn in_job(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        match &self.to_file {
+            Some([_, from_file]) => from_file.apply(place),
+            None => Some(place),
         }
     }
 
@@ -199,7 +259,12 @@ struct Outside {
 
 impl Outside {
     /// Returns how the nearest of some places lies outside the area of a system; `None` if it does not lie far outside.
-    fn of(said: &SaidSystem, (area, way): &(AreaOfUse, CrsTransform), places: &[[f64; 2]]) -> Option<Outside> {
+    fn of(
+        said: &SaidSystem,
+        (area, way): &(AreaOfUse, CrsTransform),
+        places: &[[f64; 2]],
+        others: Option<&Others>,
+    ) -> Option<Outside> {
         let beyond = |place: &[f64; 2]| way.apply(*place).map_or([f64::INFINITY; 2], |degrees| area.beyond(degrees));
         let place = *places.iter().min_by(|a, b| arc(beyond(a)).total_cmp(&arc(beyond(b))))?;
         let (degrees, beyond) = (way.apply(place), beyond(&place));
@@ -212,9 +277,14 @@ impl Outside {
         let in_file = said.in_file(place);
         let helps = |change: &Change| {
             let changed = change.apply(in_file?, &said.of_file)?;
-            Some(change.is_in_degrees() && is_within(changed) || said.of_place_in_file(changed).is_some_and(fits))
+            if change.is_in_degrees() {
+                return Some(is_within(changed));
+            }
+            let is_allowed = |others: &Others| said.in_job(changed).is_some_and(|place| others.allow(change, place));
+            Some(said.of_place_in_file(changed).is_some_and(fits) && others.is_none_or(is_allowed))
         };
-        let all = in_file.into_iter().flat_map(|place| changes(place, &said.of_file));
+        let of_one = others.into_iter().flat_map(|_| scales());
+        let all = of_one.chain(in_file.into_iter().flat_map(|place| changes(place, &said.of_file)));
         let is_far = arc(beyond) > HOPELESS;
         let mut likely = all.filter(|change| is_far || change.is_likely_near_by());
         let change = likely.find(|change| helps(change) == Some(true));
@@ -226,7 +296,8 @@ impl Outside {
     fn is_hopeless(&self) -> bool {
         let is_far = arc(self.beyond) > HOPELESS;
         let is_exchanged = self.change == Some(Change::Exchanged);
-        is_far || is_exchanged && (arc(self.beyond) > DOUBTFUL || self.beyond[1] > EXCHANGED)
+        let is_scaled = matches!(self.change, Some(Change::Scaled(_)));
+        is_far || is_scaled || is_exchanged && (arc(self.beyond) > DOUBTFUL || self.beyond[1] > EXCHANGED)
     }
 
     /// Says where the points lie and what to do.

@@ -5,6 +5,9 @@ use crate::input::{Crs, CrsKind, FileFormat, Unit};
 /// The units in which a file may be, whatever its CRS.
 const UNITS: [Unit; 5] = [Unit::Metre, Unit::Foot, Unit::Other(Unit::KILOMETRE), Unit::Other(0.01), Unit::Other(0.001)];
 
+/// What the steps of one of several files may be wrong by.
+const SCALES: [f64; 6] = [10.0, 0.1, 100.0, 0.01, 1000.0, 0.001];
+
 /// Numbers of zones stand in front of so many metres.
 const ZONE: f64 = 1e6;
 
@@ -15,12 +18,19 @@ pub(crate) enum Change {
     Degrees { exchanged: bool },
     /// x and y change places.
     Exchanged,
+    /// They are multiplied by this.
+    Scaled(f64),
     /// They count in this unit.
     Unit(Unit),
     /// This is added to them.
     Moved([f64; 2]),
     /// These have the other sign.
     Negated([bool; 2]),
+}
+
+/// Returns the changes that bring one of several files to the others, if one does.
+pub(crate) fn scales() -> impl Iterator<Item = Change> {
+    SCALES.into_iter().map(Change::Scaled)
 }
 
 /// Returns the changes of a place of a file in `crs` that are worth a try, the most usual first.
@@ -57,6 +67,7 @@ impl Change {
         Some(match self {
             Change::Degrees { exchanged: false } => [x, y],
             Change::Degrees { exchanged: true } | Change::Exchanged => [y, x],
+            Change::Scaled(factor) => [x * factor, y * factor],
             Change::Unit(unit) => {
                 let factor = unit.metres_per_unit()? / crs.metres_per_unit()?;
                 [x * factor, y * factor]
@@ -73,7 +84,7 @@ impl Change {
 
     /// Returns whether points that lie near the area are more likely to need this than to be right.
     pub(crate) fn is_likely_near_by(&self) -> bool {
-        matches!(self, Change::Exchanged | Change::Unit(_))
+        matches!(self, Change::Exchanged | Change::Scaled(_) | Change::Unit(_))
     }
 
     /// Says what to do about a file of this format.
@@ -92,6 +103,14 @@ impl Change {
                  --filters.transformation.matrix=\"0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1\"`"
                     .into()
             }
+            Change::Scaled(factor) => format!(
+                "Multiplied by {factor}, they lie beside those of the other files: {}, or leave the file out of [input] files",
+                if is_text {
+                    "the decimal point or the unit of the file is wrong. Multiply its x, y and z first"
+                } else {
+                    "the scale factors in the header of the file are wrong. Correct them first"
+                }
+            ),
             Change::Unit(unit) => {
                 format!("In the unit {}, they lie within it: name a CRS in that unit with [input] crs", unit.name())
             }

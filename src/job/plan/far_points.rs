@@ -142,8 +142,7 @@ fn coarsenings(sources: &[Source], wish: &LatticeWish, extent: &Extent) -> [u32;
 fn explain(sources: &mut [Source], rest: &Extent) {
     let [x, y, z] = [0, 1, 2].map(|axis| rounded([rest.min[axis], rest.max[axis]]));
     for source in sources.iter_mut().filter(|source| source.outliers() > 0) {
-        let all = source.box_with_outliers();
-        let is_beside = is_beside(all, rest) || all.is_none() && source.format == FileFormat::Text;
+        let is_beside = is_beside(source.box_with_outliers(), rest);
         let bounds = match is_beside {
             true => format!("[input] bounds = [{}, {}, {}, {}] or ", x[0], y[0], x[1], y[1]),
             false => {
@@ -152,17 +151,23 @@ fn explain(sources: &mut [Source], rest: &Extent) {
                 format!("[input] heights = [{low}, {high}] or ")
             }
         };
+        let points = if source.format == FileFormat::Text { "rows" } else { "points" };
+        // The message shows a row as the file has it.
+        let place = match source.transformed_from() {
+            Some(_) if source.format == FileFormat::Text => format!("in {}, ", source.crs.label()),
+            _ => String::new(),
+        };
         source.set_remedy(&format!(
-            " (x from {} to {}, y from {} to {}, z from {} to {}), and no lattice holds both at full precision: leave such points out with \
+            " ({place}x from {} to {}, y from {} to {}, z from {} to {}), and no lattice holds both at full precision: leave such {points} out with \
              {bounds}max_malformed_fraction, or set resolution or resolution_z so coarse that they fit",
             x[0], x[1], y[0], y[1], z[0], z[1]
         ));
     }
 }
 
-/// Tells whether a box reaches beyond the `rest` in x or y, so that bounds leave something of it out.
+/// Tells whether a box reaches beyond the `rest` in x or y, so that bounds leave something of it out. One that is no place of the map does.
 fn is_beside(all: Option<SourceBox>, rest: &Extent) -> bool {
     let [x, y] = [0, 1].map(|axis| rest.size(axis));
     let margin = x.max(y) / 2.0;
-    all.is_some_and(|[min, max]| (0..2).any(|k| min[k] < rest.min[k] - margin || max[k] > rest.max[k] + margin))
+    all.is_none_or(|[min, max]| (0..2).any(|k| min[k] < rest.min[k] - margin || max[k] > rest.max[k] + margin))
 }

@@ -65,7 +65,7 @@ impl JobHeights<'_> {
         let apart = files.iter().zip(self.sources).filter_map(|(file, source)| {
             file.found.as_ref().map(|found| self.sentence(source, found, file.sampled, &kept))
         });
-        Ok(apart.chain(self.flat_file(&flat, &kept)).collect())
+        apart.chain(self.flat_file(&flat, &kept).map(Ok)).collect()
     }
 
     /// Looks at the heights of a file. `all` are those of the sample; `read` is the number of records that have been read for that.
@@ -181,32 +181,31 @@ impl JobHeights<'_> {
         (0..source.chunks()).into_par_iter().map(look).try_reduce(empty, |a, b| Ok(a.and(b)))
     }
 
-    fn sentence(&self, source: &Source, found: &HeightsApart, sampled: Option<usize>, kept: &[String; 2]) -> String {
+    fn sentence(&self, source: &Source, found: &HeightsApart, sampled: Option<usize>, kept: &[String; 2]) -> Result<String> {
         let value = |height: i64| shown_own_height(source, self.lattice, height);
         let range = |group: &HeightGroup| range_text([group.low, group.high].map(value));
-        let record = if source.format == FileFormat::Text { "row" } else { "point" };
         let apart = |group: &HeightGroup| {
             let (points, has) = if group.count == 1 { ("point", "has") } else { ("points", "have") };
-            match (sampled, group.count) {
+            Ok(match (sampled, group.count) {
                 (Some(_), count) => format!("{count} {points} {has} {}", range(group)),
-                (None, 1) => format!("{record} {} has {}", group.first, range(group)),
+                (None, 1) => format!("{} has {}", source.record_name(group.first)?, range(group)),
                 (None, count) => {
-                    format!("{count} points have {} (the first is {record} {})", range(group), group.first)
+                    format!("{count} points have {} (the first is {})", range(group), source.record_name(group.first)?)
                 }
-            }
+            })
         };
-        let parts: Vec<String> = found.below.iter().chain(&found.above).map(apart).collect();
+        let parts = found.below.iter().chain(&found.above).map(apart).collect::<Result<Vec<String>>>()?;
         let of = sampled.map_or(String::new(), |count| format!("of a sample of {count} points, "));
         let others = match [found.others.low, found.others.high].map(value) {
             [low, high] if low == high => format!("have the height {low}"),
             [low, high] => format!("lie between {low} and {high}"),
         };
-        format!(
+        Ok(format!(
             "{}: {of}{}, far from all others, which {others}: they may be mistakes, or stand for nodata; {}",
             source.path.display(),
             parts.join(", and "),
             self.remedy(source, found, kept)
-        )
+        ))
     }
 
     /// Returns what to do about heights that lie apart: `[input] heights` holds for all files.

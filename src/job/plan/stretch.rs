@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::input::options::InputOptions;
-use crate::input::{FileFormat, RowBox, Source};
+use crate::input::{RowBox, Source};
 use crate::job::plan::extent::SourceBox;
 use crate::job::plan::point_survey::{PointSurvey, SplitBoxes, at_places, box_around};
 use crate::job::plan::rounded_box::rounded;
@@ -16,6 +16,16 @@ const FAR_OUT: f64 = 3.0;
 
 /// At most one point in so many stretches an area. If there are more, they are a part of it.
 const FEW: u64 = 1000;
+
+/// Of a sparse survey, a handful of points may do so, up to one in [`FEW_OF_SPARSE`], if they make the area [`FAR_STRETCHED`] times as long:
+/// a benchmark or a base station lies nearer.
+const HANDFUL: u64 = 5;
+
+/// As for [`HANDFUL`].
+const FEW_OF_SPARSE: u64 = 50;
+
+/// As for [`HANDFUL`].
+const FAR_STRETCHED: f64 = 12.0;
 
 /// The most records of files that are all looked at only for the sake of the hint.
 const MOST_RECORDS: u64 = 1 << 24;
@@ -51,11 +61,15 @@ impl Hint {
         let (Some([min, max]), Some(all)) = (found.within.1, found.all()) else { return false };
         let size = |[min, max]: SourceBox, axis: usize| max[axis] - min[axis];
         let wide = size([min, max], 0).max(size([min, max], 1));
-        let grows = |axis: usize| size(all, axis) > STRETCHED * if axis < 2 { wide } else { wide.max(max[2] - min[2]) };
+        let times = |axis: usize| size(all, axis) / if axis < 2 { wide } else { wide.max(max[2] - min[2]) };
         let [few, rest] = [found.outside.0, found.within.0];
+        let is_handful = few <= HANDFUL.min(rest / FEW_OF_SPARSE);
         match self {
-            Hint::Few => few > 0 && few <= rest / FEW && (grows(0) || grows(1)),
-            Hint::Many => few > 0 && few < rest && (0..3).any(grows),
+            Hint::Few => {
+                let times = times(0).max(times(1));
+                few > 0 && (few <= rest / FEW && times > STRETCHED || is_handful && times > FAR_STRETCHED)
+            }
+            Hint::Many => few > 0 && few < rest && (0..3).any(|axis| times(axis) > STRETCHED),
         }
     }
 }
@@ -97,7 +111,9 @@ pub(crate) fn stretch_hint<'a>(
     let mut first = None;
     for (source, survey, body) in &unread {
         let split = if is_sample { at_places(&survey.sample()?, body) } else { survey.split_at(body)? };
-        first = first.or_else(|| split.first.map(|number| place(source, number)));
+        if let (None, Some(number)) = (&first, split.first) {
+            first = Some(format!(" (the first is {} of {})", source.record_name(number)?, source.path.display()));
+        }
         found.add(split);
     }
     Ok(hint.is_worth_it(&found).then(|| sentence(&found, first, is_sample)).flatten())
@@ -114,12 +130,6 @@ fn majority(places: &[[f64; 3]]) -> Option<RowBox> {
     };
     let [x, y, z] = if places.is_empty() { return None } else { [shortest(0)?, shortest(1)?, shortest(2)?] };
     box_around([[x[0], y[0], z[0]], [x[1], y[1], z[1]]].into_iter()).map(|[min, max]| RowBox { min, max })
-}
-
-/// Returns a remark about the first of some records.
-fn place(source: &Source, number: u64) -> String {
-    let record = if source.format == FileFormat::Text { "row" } else { "point" };
-    format!(" (the first is {record} {number} of {})", source.path.display())
 }
 
 fn sentence(found: &SplitBoxes, first: Option<String>, is_sample: bool) -> Option<String> {
@@ -181,6 +191,12 @@ mod tests {
         for (few, far, expected) in [(12, 5000.0, true), (1, 481.0, true), (1, 479.0, false), (101, 5000.0, false)] {
             assert_eq!(Hint::Few.is_worth_it(&found(few, far)), expected, "{few} at {far}");
         }
+        let sparse = |few: u64, rest: u64| SplitBoxes { within: (rest, found(1, 0.0).within.1), ..found(few, 1700.0) };
+        for (few, rest, expected) in [(1, 899, true), (1, 49, false), (5, 250, true), (6, 900, false)] {
+            assert_eq!(Hint::Few.is_worth_it(&sparse(few, rest)), expected, "{few} of {rest}");
+        }
+        let benchmark = SplitBoxes { outside: found(1, 900.0).outside, ..sparse(1, 899) };
+        assert!(!Hint::Few.is_worth_it(&benchmark));
         assert_eq!(
             sentence(&found(12, 5000.0), Some(" (the first is point 7 of a.las)".into()), false).unwrap(),
             "99.98 % of the points lie within 80 x 70 units; 12 points (the first is point 7 of a.las) stretch the area to 5000 x 70: to leave them out, set [input] \

@@ -152,15 +152,34 @@ pub(crate) fn allowed_malformed(fraction: f64, records: u64) -> u64 {
     (fraction * records as f64) as u64
 }
 
-/// Returns the error for a file with too many malformed records, where bad files are not left out.
-pub(crate) fn stop_at(source: &Source, counts: &PointCounts, malformed: u64, records: u64) -> Error {
-    let what = too_many_malformed(counts, malformed, records);
+/// Returns the error for a file with too many malformed records, where bad files are not left out. `others` are the malformed records of the
+/// other files, as far as they are known.
+pub(crate) fn stop_at<'a>(
+    source: &Source,
+    counts: &PointCounts,
+    others: impl Iterator<Item = (&'a Source, u64)>,
+    [malformed, records]: [u64; 2],
+) -> Error {
+    let what = too_many_malformed(counts, malformed, records) + &in_other_files(source, others);
     Error::input(
         &source.path,
         format!(
             "{what}. Repair the file, leave it out (on_bad_file = \"skip\"), or raise max_malformed_fraction to read the rest"
         ),
     )
+}
+
+/// Returns a remark about the malformed records of other files than `source`; empty if there are none.
+fn in_other_files<'a>(source: &Source, others: impl Iterator<Item = (&'a Source, u64)>) -> String {
+    let bad: Vec<(&Source, u64)> = others.filter(|(other, count)| *count > 0 && other.path != source.path).collect();
+    let Some((first, _)) = bad.first() else { return String::new() };
+    let records: u64 = bad.iter().map(|(_, count)| count).sum();
+    let files = match bad.len() {
+        1 => String::new(),
+        2 => " and 1 other file".into(),
+        count => format!(" and {} other files", count.saturating_sub(1)),
+    };
+    format!("; {records} more in {}{files}", first.path.display())
 }
 
 /// Returns a sentence about a file with too many malformed records.
@@ -189,7 +208,10 @@ pub(crate) fn check_malformed_rows(sources: &[Source], rules: &[PointRules], opt
         if malformed > allowed_malformed(fraction, records) {
             let counts = count(source, rules)?;
             return Err(match input.on_bad_file {
-                OnBadFile::Stop => stop_at(source, &counts, malformed, records),
+                OnBadFile::Stop => {
+                    let others = sources.iter().filter(is_known).map(|source| (source, source.known_malformed()));
+                    stop_at(source, &counts, others, [malformed, records])
+                }
                 OnBadFile::Skip => Error::input(&source.path, too_many_malformed(&counts, malformed, records)),
             });
         }
@@ -212,7 +234,8 @@ pub(crate) fn check_malformed_sample(sources: &[Source], sample: &HeightSample, 
     let counts = |source: &Source| sample.by_file.get(&source.path).map(|file| &file.counts);
     let is_bad = |counts: &&PointCounts| counts.malformed > 0;
     let first = sources.iter().find_map(|source| Some((source, counts(source).filter(is_bad)?)));
-    first.map_or(Ok(()), |(source, counts)| Err(stop_at(source, counts, malformed, records)))
+    let others = sources.iter().filter_map(|source| Some((source, counts(source)?.malformed)));
+    first.map_or(Ok(()), |(source, counts)| Err(stop_at(source, counts, others, [malformed, records])))
 }
 
 /// Decodes a source for its counts.
