@@ -371,3 +371,37 @@ fn blanks_commas_and_points_between_thousands_are_refused() {
         assert!(error.exit_code() == 3 && error.to_string().contains("between thousands"), "{}: {error}", row(1));
     }
 }
+
+#[test]
+fn lines_between_rows_that_name_the_same_columns_are_no_news() {
+    let rows: String =
+        (0..50).map(|i| format!("{}.25 {}.5 {}\n", 5_933_000 + i, 565_000 + i * i % 50, i % 9)).collect();
+    for (header, between) in [
+        ("# N E H\n", "# N E H\n"),
+        ("# N E H\n", "\n## Northing [m] Easting [m] Height\n"),
+        ("# old: E N H\n# N E H\n", "# the second day, from the north east corner\n"),
+        ("N E H\n", "# x y z of the hill\n// end of part 1\n"),
+        ("", "# x y z\n"),
+        ("# 100 points\n# N E H\n", "# Scan 2, 50 points\n"),
+    ] {
+        let cloud =
+            text(&format!("{header}{rows}{between}{rows}")).unwrap_or_else(|error| panic!("{between}: {error}"));
+        assert!(!first_warning(&cloud).contains("promises"), "{between}: {}", first_warning(&cloud));
+    }
+    let named = TextOptions { columns: Some(["y", "x", "z"].map(String::from).to_vec()), ..TextOptions::default() };
+    let path = file(".csv", format!("# N E H\n{rows}# E N H\n{rows}").as_bytes());
+    assert!(open(&path, &named).is_ok());
+}
+
+#[test]
+fn heights_of_no_place_on_earth_show_that_z_is_another_column() {
+    let row = |i: usize| format!("{} {}.25 {}.5\n", 1000 + i * 7 % 50, 565_000 + i, 5_933_000 + i * i % 50);
+    let rows: String = (0..50).map(row).collect();
+    let cloud = text(&rows).unwrap();
+    let warning = first_warning(&cloud);
+    assert!(
+        warning.contains("all heights are 5933000.5 to 5933049.5") && warning.contains("columns 1, 2 and 3"),
+        "{warning}"
+    );
+    assert_eq!(first_warning(&text(&format!("x y z\n{rows}")).unwrap()), "");
+}

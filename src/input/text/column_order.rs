@@ -198,7 +198,7 @@ impl List {
         let has_others = axes.len() < run.len();
         // The places count from 0 or 1.
         let are_first = match run.iter().map(|listed| listed.place).collect::<Option<Vec<usize>>>() {
-            Some(places) => places[0] <= 1 && places.windows(2).all(|pair| pair[0] + 1 == pair[1]),
+            Some(places) => !has_others && places[0] <= 1 && places.windows(2).all(|pair| pair[0] + 1 == pair[1]),
             None => !has_others || columns == 3,
         };
         if is_in_order && are_first {
@@ -369,6 +369,9 @@ mod tests {
             "Nord Ost Hoehe",
             "col1: north\ncol2: east\ncol3: height",
             "1: id\n2: north\n3: east\n4: h",
+            "1:t 2:x 3:y 4:z",
+            "1=time, 2=x, 3=y, 4=z",
+            "[1] time\n[2] x\n[3] y\n[4] z",
             "column 2 = easting, column 1 = northing, column 3 = height",
             "easting: column 2; northing: column 1; height: column 3",
             "column 2 = easting, 3 = northing, 4 = height",

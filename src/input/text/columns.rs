@@ -14,6 +14,7 @@ use crate::input::text::decimal_sign::{self, DecimalSign};
 use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::header::{self, names_among_rows, separator_line};
 use crate::input::text::lines::is_skipped;
+use crate::input::text::lines_between::TextStart;
 use crate::input::text::names::{NamedColumns, named_columns, truncate};
 use crate::input::text::nodata_rows::NodataRows;
 use crate::input::text::number::Number;
@@ -79,7 +80,7 @@ pub(crate) struct Columns {
 /// What the lines at the start of a text show.
 pub(crate) struct DetectedColumns {
     pub(crate) columns: Columns,
-    /// How many lines come before the rows: up to the last one of a header.
+    /// How many lines come before the rows.
     pub(crate) header_lines: usize,
     /// The number of rows, if the first line holds it.
     pub(crate) promised: Option<u64>,
@@ -87,6 +88,8 @@ pub(crate) struct DetectedColumns {
     pub(crate) degrees: bool,
     /// What the names say about units.
     pub(crate) units: UnitsOfAxes,
+    /// What lines among the rows are compared with.
+    pub(crate) start: TextStart,
 }
 
 impl Columns {
@@ -144,7 +147,8 @@ impl Columns {
         let bad = |what: String| Error::input(path, what);
         let mut words = None;
         let mut doubts = None;
-        let before = &lines[..rows.get(header.lines).map_or(0, |row| row.0)];
+        header_lines = rows.get(header.lines).map_or(header_lines, |row| row.0);
+        let before = &lines[..header_lines];
         let remarks = Comments { lines: before, marks: &comments, candidates: &candidates, rows: data };
         let found = match (&options.columns, header.names) {
             (Some(names), _) => {
@@ -176,6 +180,8 @@ impl Columns {
         {
             return Err(bad(what));
         }
+        let decides = options.columns.is_none() && options.header != Some(false);
+        let start = TextStart::new(&remarks, found.as_ref(), decides);
         let mut roles = used_roles(found.as_ref(), choice);
         let delimiter = row_delimiter(&candidates, &roles, data);
         let places: Vec<usize> =
@@ -218,7 +224,7 @@ impl Columns {
             comments,
         };
         let (promised, degrees) = (header.count, found.is_some_and(|found| found.degrees));
-        Ok(DetectedColumns { columns, header_lines, promised, degrees, units })
+        Ok(DetectedColumns { columns, header_lines, promised, degrees, units, start })
     }
 
     /// Returns the sign before decimals.

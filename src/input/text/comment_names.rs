@@ -6,7 +6,7 @@ use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::header::{ROWS_FOR_NAMES, columns_of};
 use crate::input::text::lines::{is_skipped, shown};
 use crate::input::text::names::{NamedColumns, named_columns};
-use crate::input::text::numbered::are_numbered;
+use crate::input::text::numbered::{are_numbered, may_be_numbered};
 use crate::input::text::role::ColumnRole;
 
 /// What parts names in comments, though no columns, as in `# E/N/H`.
@@ -86,6 +86,10 @@ pub(crate) fn texts_of<'a>(line: &'a [u8], comments: &[String]) -> Vec<&'a [u8]>
     [after_colon, Some(text)].into_iter().flatten().collect()
 }
 
+fn begins_with_coordinate(names: &NamedColumns) -> bool {
+    matches!(names.roles.first(), Some(ColumnRole::Coordinate(_)))
+}
+
 /// The first rows of a text, and what may part their columns.
 struct Rows<'a> {
     rows: &'a [&'a [u8]],
@@ -107,11 +111,14 @@ impl Rows<'_> {
     /// without a name have none: a comment, unlike a header, need not name all. But there may be more columns than names because
     /// commas stand before decimals, or because a number of the row comes before x.
     fn fit(&self, delimiter: Delimiter, names: &NamedColumns) -> Option<NamedColumns> {
-        if self.columns().any(|columns| columns == names.count) {
+        let fields = |own: Delimiter| self.rows.iter().map(move |row| own.fields(row).len());
+        let has_as_many = |(own, columns)| columns == names.count || fields(own).any(|fields| fields == names.count);
+        if self.readings().any(has_as_many) {
             return Some(names.clone());
         }
-        let begins_with_coordinate = matches!(names.roles.first(), Some(ColumnRole::Coordinate(_)));
-        if self.may_have_decimal_commas(delimiter) || begins_with_coordinate && are_numbered(delimiter, self.rows) {
+        if self.may_have_decimal_commas(delimiter)
+            || begins_with_coordinate(names) && are_numbered(delimiter, self.rows)
+        {
             return None;
         }
         let wider = self.readings().filter(|(own, columns)| *own == delimiter && *columns > names.count);
@@ -120,10 +127,14 @@ impl Rows<'_> {
         Some(names)
     }
 
-    /// Returns whether the mark of the comment `line` may be the name of a first column, of numbers, as in `#<tab>x<tab>y<tab>z`.
+    /// Returns whether the mark of the comment `line` may be the name of a first column, of numbers, as in `#<tab>x<tab>y<tab>z`, or as in
+    /// `# x y z` before rows that begin with a whole number.
     fn may_number(&self, names: &NamedColumns, line: &[u8]) -> bool {
         let after = line.trim_ascii_start().strip_prefix(b"#").unwrap_or_default();
-        after.starts_with(b"\t") && self.columns().any(|columns| columns == names.count + 1)
+        let is_unclear = |own: Delimiter| may_be_numbered(own, self.rows) && !are_numbered(own, self.rows);
+        let is_whole = |own: Delimiter| begins_with_coordinate(names) && is_unclear(own);
+        let is_number = |own: Delimiter| after.starts_with(b"\t") || !after.is_empty() && is_whole(own);
+        self.readings().any(|(own, columns)| columns == names.count + 1 && is_number(own))
     }
 
     /// Returns whether commas may stand before decimals as well: they part columns, and no number has a point.
@@ -155,7 +166,8 @@ mod tests {
 
     fn places(comment: &str, row: &str) -> Result<Option<[usize; 3]>, ()> {
         let comments = ["#".to_string()];
-        let found = names_in_comments(&[comment.as_bytes()], &comments, &CANDIDATES, &[row.as_bytes()]);
+        let rows: Vec<&[u8]> = row.lines().map(str::as_bytes).collect();
+        let found = names_in_comments(&[comment.as_bytes()], &comments, &CANDIDATES, &rows);
         let place = |names: NamedColumns| [0, 1, 2].map(|axis| names.place(axis).unwrap());
         found.map(|found| found.named.map(place)).map_err(drop)
     }
@@ -188,5 +200,18 @@ mod tests {
         ] {
             assert_eq!(places(comment, row), Err(()), "{comment}");
         }
+    }
+
+    #[test]
+    fn the_mark_may_name_a_column_of_numbers() {
+        let places = |comment: &str, row: &str| places(comment, &[row; 6].join("\n"));
+        assert_eq!(places("# x y z", "1018 565013.5 5933084.7 25.3"), Err(()));
+        assert_eq!(places("# x y z", "565013.5 5933084.7 25.3 12"), Ok(Some([0, 1, 2])));
+        assert_eq!(places("# x y z", "565013 5933084 25.3 12"), Ok(Some([0, 1, 2])));
+    }
+
+    #[test]
+    fn empty_columns_at_the_end_of_rows_have_names() {
+        assert_eq!(places("#Label,X,Y,Z,Yaw,Pitch,Roll", "100,565013.5,5933084.7,25.3,,,"), Ok(Some([1, 2, 3])));
     }
 }

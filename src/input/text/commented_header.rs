@@ -10,6 +10,7 @@ use crate::input::text::lines::shown;
 use crate::input::text::name::{Name, words_of};
 use crate::input::text::names::{NamedColumns, named_columns};
 use crate::input::text::role::ColumnRole;
+use crate::input::windows_1252::decoded;
 
 /// So many names of coordinates and times make a header.
 const LEAST_KNOWN: usize = 2;
@@ -44,7 +45,7 @@ impl Comments<'_> {
     pub(crate) fn unread_header(&self, has_words: bool) -> Option<UnreadHeader> {
         let list = if has_words { None } else { self.unread_list() };
         if let Some((line, Doubt::Certain, error)) = list {
-            return Some(UnreadHeader::Certain(format!("the comment {} {error}: {REMEDY}", shown(line))));
+            return Some(UnreadHeader::Certain(refusal(line, &error)));
         }
         let (lines, texts): (Vec<&[u8]>, Vec<&[u8]>) = self.texts().unzip();
         let order = doubt(&texts, self.widths().into_iter().max().unwrap_or(0));
@@ -58,6 +59,12 @@ impl Comments<'_> {
             "the comment {} may name the columns: the first three are taken for x, y and z; say otherwise with `columns` under [input.csv]",
             shown(line)
         )))
+    }
+
+    /// Returns what to say of a comment that certainly is a list of names, of which those of x, y and z are not known.
+    pub(crate) fn unread_names(&self) -> Option<String> {
+        let (line, _, error) = self.unread_list().filter(|(_, doubt, _)| *doubt == Doubt::Certain)?;
+        Some(refusal(line, &error))
     }
 
     /// Returns a sentence about a comment that says that x or y of these names has another direction.
@@ -105,6 +112,10 @@ impl Comments<'_> {
     }
 }
 
+fn refusal(line: &[u8], error: &str) -> String {
+    format!("the comment {} {error}: {REMEDY}", shown(line))
+}
+
 /// Returns what may be a list in a comment: all of its text, and what follows its last colon, unless that is the value of something else.
 fn lists_of<'a>(line: &'a [u8], marks: &[String]) -> Vec<&'a [u8]> {
     let mut texts = texts_of(line, marks);
@@ -123,13 +134,17 @@ fn header_doubt(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> Opt
     let named = fields.len() - fields.last().is_some_and(|last| last.is_empty()) as usize;
     let fields = &fields[..named];
     let is_name = |field: &&[u8]| {
-        field.iter().any(u8::is_ascii_alphabetic)
+        decoded(field).contains(char::is_alphabetic)
             && std::str::from_utf8(field).map_or(true, |text| text.parse::<f64>().is_err())
     };
     if named < 3 || !fields.iter().all(is_name) {
         return None;
     }
     let is_as_wide = widths.contains(&named);
+    if fields.iter().any(|field| !field.iter().any(u8::is_ascii_alphabetic)) {
+        // Few words of other scripts are known.
+        return is_as_wide.then_some(Doubt::Possible);
+    }
     let is_word = |field: &&[u8]| !Name::read(field).has_blanks();
     let are_words = delimiter != Delimiter::Blank && fields.iter().all(|field| is_word(&field));
     let fields: Vec<(bool, Vec<Token>)> = fields.iter().map(|field| (is_word(field), tokens(field))).collect();
@@ -230,6 +245,17 @@ mod tests {
         for comment in ["# one,two,three", "# Meyer, Berger, Bern", "# NCOLS, NROWS, CELLSIZE"] {
             let what = unread(comment, "42000.5,78.1,301.2");
             assert!(matches!(what, Some(UnreadHeader::Possible(what)) if what.contains("first three")), "{comment}");
+        }
+    }
+
+    #[test]
+    fn words_of_other_scripts_are_doubtful() {
+        for comment in ["# 序号 东坐标 北坐标 高程", "# رقم شرق شمال ارتفاع", "# α/α Χ Υ Ζ", "# 点,東,北,高"]
+        {
+            for row in ["1018 565013.5 5933084.7 25.3", "1018,565013.5,5933084.7,25.3"] {
+                assert!(matches!(unread(comment, row), Some(UnreadHeader::Possible(_))), "{comment}");
+            }
+            assert_eq!(unread(comment, "565013.5 5933084.7 25.3"), None, "{comment}");
         }
     }
 

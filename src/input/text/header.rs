@@ -18,6 +18,8 @@ pub(crate) enum HeaderLineError {
     NoNames,
     #[error("is no number of points as PTS begins with, which is in digits alone: write it so, or remove the line")]
     NoCount,
+    #[error("is too large for a number of points: correct it, or remove the line")]
+    LargeCount,
     #[error("{0}; name the columns with `columns` under [input.csv]")]
     Names(#[from] NamesError),
     #[error(
@@ -70,7 +72,11 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
         None if named => Header { lines: after(0), names: None, count: count_in(lines[0]) },
         None if count_in(lines[0]).is_some() => Header { lines: 1, names: None, count: count_in(lines[0]) },
         None => {
-            let error = if is_like_count(lines[0]) { Some(HeaderLineError::NoCount) } else { names(lines[0]).err() };
+            let error = match lines[0].trim_ascii() {
+                line if !line.is_empty() && line.iter().all(u8::is_ascii_digit) => Some(HeaderLineError::LargeCount),
+                line if is_like_count(line) => Some(HeaderLineError::NoCount),
+                line => names(line).err(),
+            };
             let error = error.map(|error| error.to_string()).unwrap_or_default();
             Header { lines: 1, names: Some(Err(format!("the first line, {}, {error}", shown(lines[0])))), count: None }
         }

@@ -3,6 +3,7 @@
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::text::columns::{Columns, comments};
 use crate::input::text::lines::{is_skipped, without_return};
+use crate::input::text::lines_between::TextStart;
 use crate::input::text::options::TextOptions;
 use crate::input::text::row_choice::RowChoice;
 use crate::input::text::units::UnitsOfAxes;
@@ -30,6 +31,8 @@ pub(crate) struct Layout {
     pub(crate) promised: Option<u64>,
     pub(crate) named_degrees: bool,
     pub(crate) units: UnitsOfAxes,
+    /// What lines among the rows are compared with.
+    pub(crate) start: TextStart,
 }
 
 /// Finds out how the text is laid out and where its rows begin.
@@ -53,7 +56,8 @@ pub(crate) fn detect(
     let at = ((mark + before) as u64).min(file.size());
     let first = FirstRow { at, line: found.header_lines as u64 + 1 };
     let promised = found.promised;
-    Ok(Layout { columns: found.columns, first, promised, named_degrees: found.degrees, units: found.units })
+    let (columns, named_degrees) = (found.columns, found.degrees);
+    Ok(Layout { columns, first, promised, named_degrees, units: found.units, start: found.start })
 }
 
 /// Fails if lines end with carriage returns alone.

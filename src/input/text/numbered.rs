@@ -12,23 +12,36 @@ const COLUMNS: usize = 4;
 /// Returns whether the first of four or more columns is the number of the row: whole, and one more from row to row, or at least growing
 /// where each of the next three columns has decimals. x, y and z are written alike.
 pub(crate) fn are_numbered(delimiter: Delimiter, rows: &[&[u8]]) -> bool {
+    let rows = with_whole_first(delimiter, rows);
+    let steps = |is_step: fn(i64) -> bool| {
+        rows.windows(2).all(|pair| pair[1][0].mantissa.checked_sub(pair[0][0].mantissa).is_some_and(is_step))
+    };
+    !rows.is_empty() && (steps(|step| step == 1) || steps(|step| step > 0) && have_decimals(&rows))
+}
+
+/// Returns whether the first of four or more columns is whole, and each of the next three has decimals.
+pub(crate) fn may_be_numbered(delimiter: Delimiter, rows: &[&[u8]]) -> bool {
+    let rows = with_whole_first(delimiter, rows);
+    !rows.is_empty() && have_decimals(&rows)
+}
+
+/// Returns the first columns of these rows if the first of them is whole in all, and if they are enough.
+fn with_whole_first(delimiter: Delimiter, rows: &[&[u8]]) -> Vec<[Number; COLUMNS]> {
     let read = |row: &&[u8]| -> Option<[Number; COLUMNS]> {
         let fields = delimiter.fields(row);
         let numbers: Vec<Number> = fields.iter().take(COLUMNS).map_while(|field| Number::parse(field)).collect();
         numbers.try_into().ok()
     };
     if rows.iter().find_map(read).is_none_or(|first| first[0].decimals > 0) {
-        return false;
+        return Vec::new();
     }
     let rows: Vec<[Number; COLUMNS]> = rows.iter().filter_map(read).collect();
-    if rows.len() < LEAST_ROWS || rows.iter().any(|row| row[0].decimals > 0) {
-        return false;
-    }
-    let steps = |is_step: fn(i64) -> bool| {
-        rows.windows(2).all(|pair| pair[1][0].mantissa.checked_sub(pair[0][0].mantissa).is_some_and(is_step))
-    };
+    if rows.len() < LEAST_ROWS || rows.iter().any(|row| row[0].decimals > 0) { Vec::new() } else { rows }
+}
+
+fn have_decimals(rows: &[[Number; COLUMNS]]) -> bool {
     let has_decimals = |column: usize| rows.iter().filter(|row| row[column].decimals > 0).count() * 2 > rows.len();
-    steps(|step| step == 1) || (steps(|step| step > 0) && (1..COLUMNS).all(has_decimals))
+    (1..COLUMNS).all(has_decimals)
 }
 
 #[cfg(test)]

@@ -44,8 +44,12 @@ impl RowError {
         match *self {
             RowError::Missing { column } => {
                 let is_count = line.trim_ascii().iter().all(u8::is_ascii_digit);
-                let hint =
-                    if is_count { ": it may be the number of points of another scan; remove such lines" } else { "" };
+                let hint = if is_count {
+                    ": it may be the number of points of another scan; split the file before such lines, so that the points of each scan are \
+                     counted"
+                } else {
+                    ""
+                };
                 format!("{} is missing in {}{hint}", place(column), shown(line))
             }
             RowError::Unexpected { column, expected } => {

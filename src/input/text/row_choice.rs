@@ -41,6 +41,8 @@ pub struct RowChoice {
     pub bounds: Option<[f64; 4]>,
     /// Whether the job transforms coordinates, so that degrees are nothing to warn about.
     pub is_transformed: bool,
+    /// Whether the job says the unit of the coordinates.
+    pub has_unit: bool,
     /// Only rows of these classes.
     pub classes: [bool; 256],
     /// Whether the user has said which classes. If not, a class that cannot be read counts as 0.
@@ -63,6 +65,7 @@ impl RowChoice {
         RowChoice {
             bounds: None,
             is_transformed: false,
+            has_unit: false,
             classes: [true; 256],
             strict_classes: false,
             returns: KeptReturns::All,

@@ -9,6 +9,7 @@ use crate::input::points::nodata_choice::NodataChoice;
 use crate::input::text::columns::Columns;
 use crate::input::text::granularity::Granularity;
 use crate::input::text::lines::{TextLine, for_each_line};
+use crate::input::text::lines_between::{LinesBetween, TextStart};
 use crate::input::text::nodata_rows::NodataRows;
 use crate::input::text::noise;
 use crate::input::text::number::Number;
@@ -49,6 +50,8 @@ pub(crate) struct Survey {
     pub(crate) outlier_box: RowBox,
     /// The box of the other rows.
     pub(crate) others: RowBox,
+    /// What stands between the rows.
+    pub(crate) between: LinesBetween,
 }
 
 /// What rows hold.
@@ -183,6 +186,7 @@ impl Survey {
             outliers: 0,
             outlier_box: none,
             others: none,
+            between: LinesBetween::default(),
         }
     }
 
@@ -193,20 +197,25 @@ impl Survey {
         all
     }
 
-    /// Surveys the lines that begin in `range`. The first row of the text is at byte `first`.
+    /// Surveys the lines that begin in `range`. The first row of the text is at byte `first`. Lines that are no rows are compared with
+    /// `start`, if it is given.
     pub(crate) fn of_range(
         file: &RandomAccessFile,
         columns: &Columns,
         first: u64,
         range: Range<u64>,
         wanted: Wanted,
+        start: Option<&TextStart>,
     ) -> Result<Survey> {
         let mut survey = Survey::empty();
         let mut reader = RowReader::new(columns);
         let is_all = wanted.choice.is_all() && wanted.within.is_none();
         survey.lines = for_each_line(file, first, range, |index, line| {
             match line {
-                TextLine::Whole(line) if columns.skips(line) => return Ok(()),
+                TextLine::Whole(line) if columns.skips(line) => {
+                    survey.see_between(start, index, line);
+                    return Ok(());
+                }
                 TextLine::Whole(line) if reader.read(line).is_ok() => {
                     survey.colors.see(reader.colors);
                     survey.intensities.see(reader.brightness);
@@ -224,12 +233,22 @@ impl Survey {
                         survey.others.see(&reader.numbers);
                     }
                 }
-                _ => survey.malformed += 1,
+                TextLine::Whole(line) => {
+                    survey.malformed += 1;
+                    survey.see_between(start, index, line);
+                }
+                TextLine::TooLong => survey.malformed += 1,
             }
             survey.rows += 1;
             Ok(())
         })?;
         Ok(survey)
+    }
+
+    fn see_between(&mut self, start: Option<&TextStart>, index: u64, line: &[u8]) {
+        if let Some(start) = start {
+            self.between.see(start, index, line);
+        }
     }
 
     /// Counts the last row of `reader`, whose height stands for nodata, on line `index`.
@@ -253,6 +272,7 @@ impl Survey {
         self.huge_heights.add(&other.huge_heights, self.lines);
         self.named_heights.add(&other.named_heights, self.lines);
         self.without_height += other.without_height;
+        self.between.add(&other.between, self.lines);
         self.lines += other.lines;
         self.rows += other.rows;
         self.malformed += other.malformed;

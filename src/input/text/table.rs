@@ -19,6 +19,7 @@ use crate::input::text::degrees;
 use crate::input::text::granularity::Granularity;
 use crate::input::text::layout::{Layout, detect};
 use crate::input::text::lines::{LONGEST, TextLine, bytes_around, for_each_line, shown};
+use crate::input::text::lines_between::TextStart;
 use crate::input::text::nodata_rows::NodataRows;
 use crate::input::text::noise_warning::noise_warning;
 use crate::input::text::number::{MOST_DECIMALS, POWERS};
@@ -28,6 +29,7 @@ use crate::input::text::role::ColumnRole;
 use crate::input::text::row::RowReader;
 use crate::input::text::row_box::RowBox;
 use crate::input::text::row_choice::{RowChoice, is_within};
+use crate::input::text::stated_count::count_warning;
 use crate::input::text::survey::{Findings, Survey, Wanted};
 use crate::{Error, Result, Warnings, interrupt};
 
@@ -39,6 +41,9 @@ const SAMPLED_CHUNKS: u64 = 16;
 
 /// If all x and y are smaller, the decimals that are kept do not tell them apart.
 const TINY: f64 = 1e-12;
+
+/// No place on Earth is higher or deeper, in metres.
+const HIGHEST: f64 = 12_000.0;
 
 /// A text after the first pass over it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -133,7 +138,8 @@ impl TextTable {
         choice: &RowChoice,
         warnings: &mut Warnings,
     ) -> Result<TextTable> {
-        let Layout { mut columns, first, promised, named_degrees, units } = detect(file, options, choice, warnings)?;
+        let Layout { mut columns, first, promised, named_degrees, units, start } =
+            detect(file, options, choice, warnings)?;
         let mut rows = first.at..file.size();
         let cut = match cut_off::find(file, &columns, &rows)? {
             Ending::CutOff(cut) => Some(cut),
@@ -145,11 +151,16 @@ impl TextTable {
         };
         rows.end = cut.as_ref().map_or(rows.end, |cut| cut.at);
         let mut nodata = columns.nodata.clone();
-        let mut surveys = survey(file, &columns, &rows, Wanted { choice, nodata: &nodata, within: None })?;
+        let mut surveys =
+            survey(file, &columns, &rows, Wanted { choice, nodata: &nodata, within: None }, Some(&start))?;
         let mut all = Survey::of_all(&surveys);
+        let between = std::mem::take(&mut all.between);
+        if let Some((index, what)) = between.other_header {
+            return Err(Error::input(file.path(), format!("line {}: {what}", first.line + index)));
+        }
         let found = all.nodata(&choice.nodata);
         if nodata.add(&found) {
-            surveys = survey(file, &columns, &rows, Wanted { choice, nodata: &nodata, within: None })?;
+            surveys = survey(file, &columns, &rows, Wanted { choice, nodata: &nodata, within: None }, None)?;
             all = Survey::of_all(&surveys);
         }
         let on_line = |height: &SharedHeight| SharedHeight { first: first.line + height.first, ..*height };
@@ -173,6 +184,9 @@ impl TextTable {
         let RowBox { min, max } = bounds.unwrap_or(RowBox { min: [0.0; 3], max: [0.0; 3] });
         let malformed = all.malformed + cut.is_some() as u64;
         let records = all.rows + cut.is_some() as u64;
+        let is_unclear = start.is_guessed() && !choice.has_unit;
+        warnings.extend(all.wanted.bounds.some().filter(|_| is_unclear).and_then(|rows| no_heights(&rows)));
+        warnings.extend(count_warning(&[start.counts, between.counts].concat(), records));
         let wanted = WantedRows::new(&all.wanted);
         let mut table = TextTable {
             columns,
@@ -250,7 +264,7 @@ impl TextTable {
             return Ok(Outliers::default());
         };
         let wanted = Wanted { choice, nodata: &self.nodata, within: Some(within) };
-        let surveys = survey(file, &self.columns, &self.rows, wanted)?;
+        let surveys = survey(file, &self.columns, &self.rows, wanted, None)?;
         let rest = Survey::of_all(&surveys);
         self.outliers = Outliers::of(&rest);
         self.without_outliers = (self.outliers.rows > 0).then(|| WantedRows::new(&rest.wanted));
@@ -477,6 +491,17 @@ fn refuse_tiny(file: &RandomAccessFile, found: &Findings) -> Result<()> {
     ))
 }
 
+/// Returns a warning if no number in a third column that nothing names is the height of a place on Earth in metres.
+fn no_heights(rows: &RowBox) -> Option<String> {
+    let (min, max) = (rows.min[2], rows.max[2]);
+    (min > HIGHEST || max < -HIGHEST).then(|| {
+        format!(
+            "all heights are {min} to {max}, which is no height on Earth in metres: no line names the columns, so x, y and z were taken from \
+             columns 1, 2 and 3. Name the columns with `columns` under [input.csv], or set [input] unit"
+        )
+    })
+}
+
 /// Returns how many of the rows are missing that the first line promises.
 fn missing_rows(promised: Option<u64>, rows: u64, warnings: &mut Warnings) -> u64 {
     // No job holds more, and no sum of so many files runs over.
@@ -500,12 +525,18 @@ fn starts_of_chunks(surveys: &[Survey], first: u64) -> Vec<ChunkStart> {
     surveys.iter().map(start).collect()
 }
 
-/// Surveys all rows, chunk by chunk.
-fn survey(file: &RandomAccessFile, columns: &Columns, rows: &Range<u64>, wanted: Wanted) -> Result<Vec<Survey>> {
+/// Surveys all rows, chunk by chunk. Lines that are no rows are compared with `start`, if it is given.
+fn survey(
+    file: &RandomAccessFile,
+    columns: &Columns,
+    rows: &Range<u64>,
+    wanted: Wanted,
+    start: Option<&TextStart>,
+) -> Result<Vec<Survey>> {
     let count = (rows.end - rows.start).div_ceil(CHUNK);
     let survey = |index| {
         interrupt::check()?;
-        Survey::of_range(file, columns, rows.start, chunk_range(rows, index), wanted)
+        Survey::of_range(file, columns, rows.start, chunk_range(rows, index), wanted, start)
     };
     file.expect((0..count).map(|index| vec![bytes_around(rows.start, &chunk_range(rows, index), file.size())]));
     let surveys = (0..count).into_par_iter().map(survey).collect();

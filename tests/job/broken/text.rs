@@ -80,6 +80,44 @@ pub(super) fn cases() -> Vec<Case> {
             b"# time, lat, lon, level\n1.5,2,3.5,4\n2.5,3,3.5,4\n3.5,2,7.5,4\n".to_vec(),
             Refused(3, "names no column z"),
         ),
+        (
+            "a second header, in another order",
+            [b"# E N H\n", ROWS.as_bytes(), b"# N E H\n", ROWS.as_bytes()].concat(),
+            Refused(3, "line 7: the comment \"# N E H\" names other columns than line 1 (\"# E N H\"): split the file"),
+        ),
+        (
+            "a second header, in other units",
+            [b"x[m],y[m],z[m]\n", ROWS.as_bytes(), b"# x[m] y[m] z[ft]\n", ROWS.as_bytes()].concat(),
+            Refused(3, "line 7: the comment \"# x[m] y[m] z[ft]\" gives the columns other units than line 1"),
+        ),
+        (
+            "a second header that is no comment",
+            [b"E,N,H\n", ROWS.as_bytes(), b"N,E,H\n", ROWS.as_bytes()].concat(),
+            Refused(3, "line 7: the line \"N,E,H\" names other columns than line 1"),
+        ),
+        (
+            "a second header with names that are not known",
+            [b"x,y,z\n", ROWS.as_bytes(), b"# time, lat, lon\n", ROWS.as_bytes()].concat(),
+            Refused(3, "line 7: the comment \"# time, lat, lon\" names no column z"),
+        ),
+        (
+            "the names of the columns at the end",
+            rows_and("# columns: northing easting elevation\n"),
+            Refused(
+                3,
+                "line 6: the comment \"# columns: northing easting elevation\" names other columns than x, y and z",
+            ),
+        ),
+        (
+            "fewer points than a comment promises",
+            rows_and("# 7 points exported\n"),
+            Read(5, 0, "promises 7 points, but the file has only 5"),
+        ),
+        (
+            "a number of points beyond all numbers",
+            [b"184467440737095516160\n", ROWS.as_bytes()].concat(),
+            Refused(3, "too large for a number of points"),
+        ),
         ("infinite", rows_and("1,-inf,2\n"), Refused(3, "line 6: column 2 (y) is \"-inf\"")),
         ("hexadecimal", rows_and("0x10,1,2\n"), Refused(3, "column 1 (x) is \"0x10\"")),
         ("beyond all numbers", rows_and("1e300,1,2\n"), Refused(3, "column 1 (x) is \"1e300\", which is too large")),
