@@ -415,7 +415,11 @@ mod tests {
         let (features, warnings) = collector.finish();
         let all: Vec<&str> = warnings.iter().collect();
         assert_eq!((features.len(), all.len()), (1, 3));
-        let starts = [("1 features have no geometry", 3), ("2 features are lines without two", 1), ("1 features have a part", 4)];
+        let starts = [
+            ("1 features have no geometry", 3),
+            ("2 features are lines without two", 1),
+            ("1 features have a part", 4),
+        ];
         for ((start, first), text) in starts.into_iter().zip(all) {
             assert!(text.starts_with(start) && text.ends_with(&format!("feature {first}")), "{text}");
         }
