@@ -19,14 +19,22 @@ pub(super) struct FeatureCollector<'a> {
     features: Vec<LineFeature>,
     without_geometry: LeftOut,
     too_short: LeftOut,
+    without_inside: LeftOut,
     without_parts: LeftOut,
     of_other_kinds: LeftOut,
     crossing: LeftOut,
     hole_outside: LeftOut,
     enclosing_nothing: LeftOut,
     not_looked_at: LeftOut,
-    /// Whether a part of the feature at hand was too short.
-    has_short_part: bool,
+    /// A part of the feature at hand that is left out.
+    left_out: Option<Part>,
+}
+
+/// A part of a feature.
+#[derive(Clone, Copy)]
+enum Part {
+    Line,
+    Outline,
 }
 
 /// How many features are left out or doubtful for one reason, and the first of them, with a place.
@@ -69,8 +77,9 @@ impl<'a> FeatureCollector<'a> {
             features: Vec::new(),
             without_geometry: LeftOut::default(),
             too_short: LeftOut::default(),
+            without_inside: LeftOut::default(),
             without_parts: LeftOut::default(),
-            has_short_part: false,
+            left_out: None,
             of_other_kinds: LeftOut::default(),
             crossing: LeftOut::default(),
             hole_outside: LeftOut::default(),
@@ -101,11 +110,12 @@ impl<'a> FeatureCollector<'a> {
         };
         let before = self.features.len();
         self.add_geometry(number, kind, height, geometry)?;
-        match (std::mem::take(&mut self.has_short_part), self.features.len() > before) {
-            (true, true) => self.without_parts.note(number),
-            (true, false) => self.too_short.note(number),
-            (false, false) => self.without_geometry.note(number),
-            (false, true) => {}
+        match (self.left_out.take(), self.features.len() > before) {
+            (Some(_), true) => self.without_parts.note(number),
+            (Some(Part::Line), false) => self.too_short.note(number),
+            (Some(Part::Outline), false) => self.without_inside.note(number),
+            (None, false) => self.without_geometry.note(number),
+            (None, true) => {}
         }
         Ok(())
     }
@@ -123,11 +133,13 @@ impl<'a> FeatureCollector<'a> {
     pub(super) fn finish(self) -> (Vec<LineFeature>, Warnings) {
         let mut warnings = Warnings::default();
         warnings.extend(self.without_geometry.warning("have no geometry and are left out"));
-        warnings.extend(self.too_short.warning(
-            "have no two different vertices (an area: three in its outline, not all on one line) and are left out",
+        warnings.extend(self.too_short.warning("are lines without two different vertices and are left out"));
+        warnings.extend(self.without_inside.warning(
+            "are areas whose outline encloses nothing (it has fewer than three vertices, lies on one line, or goes back over its own way) and \
+             are left out",
         ));
         warnings.extend(self.without_parts.warning(
-            "have a part without two different vertices (an area: an outline without three), which is left out",
+            "have a part that is left out: a line without two different vertices, or an outline that encloses nothing",
         ));
         warnings.extend(
             self.of_other_kinds.warning("have a value of kind_field that kinds does not list and are left out"),
@@ -199,7 +211,7 @@ impl<'a> FeatureCollector<'a> {
     fn add_line(&mut self, number: u64, kind: FeatureKind, height: Option<f64>, line: Vec<[f64; 3]>) -> Result<()> {
         let line = self.checked(number, height, line)?;
         if line.len() < 2 {
-            self.has_short_part = true;
+            self.left_out = Some(Part::Line);
             return Ok(());
         }
         let shape = match (kind, is_closed(&line)) {
@@ -237,7 +249,7 @@ impl<'a> FeatureCollector<'a> {
                 kept.push(ring);
                 continue;
             }
-            self.has_short_part = true;
+            self.left_out = Some(Part::Outline);
             if index == 0 {
                 // Islands without their lake are nothing.
                 return Ok(());
@@ -380,14 +392,14 @@ mod tests {
             let all: Vec<&str> = warnings.iter().collect();
             assert!(features.is_empty() && all.len() == 1 && all[0].contains("no geometry"), "{all:?}");
         }
-        for geometry in [
-            RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]]]),
-            RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]; 5]]),
-            RawGeometry::Areas(vec![vec![square()[..2].to_vec(), square()]]),
+        for (geometry, words) in [
+            (RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]]]), "lines without two different vertices"),
+            (RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]; 5]]), "lines without two different vertices"),
+            (RawGeometry::Areas(vec![vec![square()[..2].to_vec(), square()]]), "areas whose outline encloses nothing"),
         ] {
             let (features, warnings) = collect("", geometry, WantedAttributes::NONE).unwrap();
             let all: Vec<&str> = warnings.iter().collect();
-            assert!(features.is_empty() && all.len() == 1 && all[0].contains("two different"), "{all:?}");
+            assert!(features.is_empty() && all.len() == 1 && all[0].contains(words), "{all:?}");
         }
     }
 
@@ -403,7 +415,11 @@ mod tests {
         let (features, warnings) = collector.finish();
         let all: Vec<&str> = warnings.iter().collect();
         assert_eq!((features.len(), all.len()), (1, 3));
-        let starts = [("1 features have no geometry", 3), ("2 features have no two", 1), ("1 features have a part", 4)];
+        let starts = [
+            ("1 features have no geometry", 3),
+            ("2 features are lines without two", 1),
+            ("1 features have a part", 4),
+        ];
         for ((start, first), text) in starts.into_iter().zip(all) {
             assert!(text.starts_with(start) && text.ends_with(&format!("feature {first}")), "{text}");
         }

@@ -1,5 +1,7 @@
 //! The outlines of lakes. What encloses nothing is taken out of them, and what no area has is found.
 
+use std::collections::HashMap;
+
 use robust::{Coord, orient2d};
 
 use crate::input::lines::polygons::holds;
@@ -36,33 +38,45 @@ pub(super) enum Flaw {
     TooMany,
 }
 
-/// Returns a ring without the ways out and back along the same vertices, and once if it is run through several times. A ring that encloses
-/// nothing has fewer than three vertices then. The last vertex is joined with the first, and does not repeat it.
+/// Returns a ring without the ways out and back along the same vertices, and once if it is run through several times, with the lowest and the
+/// highest height of each place. A ring that encloses nothing has fewer than three vertices then.
+/// The last vertex is joined with the first, and does not repeat it.
 pub(super) fn simplified(ring: Ring) -> Ring {
     if is_on_one_line(&ring) {
         return Vec::new();
     }
     let mut places = ring.clone();
-    merge_repeated(&mut places, is_same);
-    let (count, period) = (without_spikes(places.clone()).len(), period(&places));
-    if count == places.len() && period == places.len() {
-        return ring;
-    }
-    let mut once = without_spikes(places);
-    let period = self::period(&once);
-    let again = once.split_off(period);
-    for (index, vertex) in again.into_iter().enumerate() {
-        let kept = &mut once[index % period];
-        kept[2] = kept[2].min(vertex[2]);
-    }
-    once
+    places.dedup_by(|next, before| is_same(next, before));
+    let mut once = without_spikes(places.clone());
+    once.truncate(period(&once));
+    if once.len() == places.len() { ring } else { with_heights_of(&once, &ring) }
 }
 
-/// Removes rings that repeat another one among `holes`, and tells whether one is the same as the `outline`.
+/// Removes rings that repeat another one among `holes`, which keeps their heights, and tells whether one is the same as the `outline`.
 pub(super) fn remove_repeated(outline: &Ring, holes: &mut Vec<Ring>) -> bool {
+    let all: Ring = holes.iter().flatten().copied().collect();
+    let count = holes.len();
     let mut known = std::collections::HashSet::new();
     holes.retain(|hole| known.insert(canonical(hole)));
+    if holes.len() < count {
+        holes.iter_mut().for_each(|hole| *hole = with_heights_of(hole, &all));
+    }
     known.contains(&canonical(outline))
+}
+
+/// Returns the vertices of a ring with the lowest height that `all` vertices have there, each followed by one with the highest if that differs:
+/// a lake takes its lowest height, and is not flat if it has another.
+fn with_heights_of(ring: &Ring, all: &Ring) -> Ring {
+    let mut ranges: HashMap<[u64; 2], [f64; 2]> = HashMap::new();
+    for vertex in all {
+        let [low, high] = ranges.entry(place_bits(vertex)).or_insert([vertex[2]; 2]);
+        (*low, *high) = (low.min(vertex[2]), high.max(vertex[2]));
+    }
+    let heights = |vertex: &[f64; 3]| ranges.get(&place_bits(vertex)).copied().unwrap_or([vertex[2]; 2]);
+    let vertices = ring.iter().flat_map(|vertex| heights(vertex).map(|z| [vertex[0], vertex[1], z]));
+    let mut vertices: Ring = vertices.collect();
+    vertices.dedup_by(|next, before| next.map(f64::to_bits) == before.map(f64::to_bits));
+    vertices
 }
 
 /// Returns what is wrong with the outlines of a lake: the first is its own, and the others are those of holes.
@@ -91,17 +105,6 @@ fn is_same(one: &[f64; 3], other: &[f64; 3]) -> bool {
     one[..2] == other[..2]
 }
 
-/// Merges a vertex with the one before it where `is_repeated` says so. The lower height stays: it is that of the lake.
-fn merge_repeated(ring: &mut Ring, is_repeated: impl Fn(&[f64; 3], &[f64; 3]) -> bool) {
-    ring.dedup_by(|next, before| {
-        let repeats = is_repeated(next, before);
-        if repeats {
-            before[2] = before[2].min(next[2]);
-        }
-        repeats
-    });
-}
-
 fn is_on_one_line(ring: &Ring) -> bool {
     let Some(first) = ring.first() else { return true };
     let Some(other) = ring.iter().find(|vertex| !is_same(vertex, first)) else { return true };
@@ -115,10 +118,7 @@ fn without_spikes(ring: Ring) -> Ring {
         let before = way.len().checked_sub(2).and_then(|at| way.get(at));
         if before.is_some_and(|before| is_same(before, &vertex)) {
             way.pop_back();
-            lower(way.back_mut(), vertex);
-        } else if way.back().is_some_and(|last| is_same(last, &vertex)) {
-            lower(way.back_mut(), vertex);
-        } else {
+        } else if !way.back().is_some_and(|last| is_same(last, &vertex)) {
             way.push_back(vertex);
         }
     }
@@ -126,9 +126,7 @@ fn without_spikes(ring: Ring) -> Ring {
     while way.len() > 1 {
         let last = way.len().saturating_sub(1);
         if is_same(&way[0], &way[last]) {
-            let vertex = way[last];
             way.pop_back();
-            lower(way.front_mut(), vertex);
         } else if is_same(&way[1], &way[last]) {
             way.pop_front();
         } else if last > 1 && is_same(&way[0], &way[last.saturating_sub(1)]) {
@@ -138,12 +136,6 @@ fn without_spikes(ring: Ring) -> Ring {
         }
     }
     way.into()
-}
-
-fn lower(kept: Option<&mut [f64; 3]>, vertex: [f64; 3]) {
-    if let Some(kept) = kept {
-        kept[2] = kept[2].min(vertex[2]);
-    }
 }
 
 /// Returns after how many vertices a ring begins again, by the failure function of Knuth, Morris and Pratt.
@@ -162,8 +154,7 @@ fn period(ring: &Ring) -> usize {
 
 /// Returns the places of a ring from the least one on, in the direction in which the lesser of its neighbours comes next.
 fn canonical(ring: &Ring) -> Vec<[u64; 2]> {
-    // 0 has two signs.
-    let mut places: Vec<[u64; 2]> = ring.iter().map(|v| [(v[0] + 0.0).to_bits(), (v[1] + 0.0).to_bits()]).collect();
+    let mut places: Vec<[u64; 2]> = ring.iter().map(place_bits).collect();
     places.dedup();
     let least = (0..places.len()).min_by_key(|&at| places[at]).unwrap_or(0);
     places.rotate_left(least);
@@ -172,6 +163,11 @@ fn canonical(ring: &Ring) -> Vec<[u64; 2]> {
         places.rotate_right(1);
     }
     places
+}
+
+/// Returns what is the same for vertices at the same place: 0 has two signs.
+fn place_bits(vertex: &[f64; 3]) -> [u64; 2] {
+    [(vertex[0] + 0.0).to_bits(), (vertex[1] + 0.0).to_bits()]
 }
 
 /// Returns a number above 0 if c lies to the left of ab, below 0 if it lies to the right, and 0 if it lies on the line. It is exact.
@@ -272,7 +268,8 @@ mod tests {
             (&[A, B, [20, 0], [5, 0]], &[]),
             (&[A, A, A], &[]),
         ] {
-            let found = places(&simplified(ring(given)));
+            let mut found = places(&simplified(ring(given)));
+            found.dedup();
             assert!(found == expected || found.len() < 3 && expected.is_empty(), "{given:?} {found:?}");
         }
         // Nothing is taken out, so heights of repeated vertices stay too.
@@ -285,7 +282,7 @@ mod tests {
             [1.0, 0.0, 2.0],
             [1.0, 1.0, 9.0],
         ]);
-        assert_eq!(twice.iter().map(|vertex| vertex[2]).collect::<Vec<_>>(), [5.0, 2.0, 5.0]);
+        assert_eq!(twice.iter().map(|vertex| vertex[2]).collect::<Vec<_>>(), [5.0, 2.0, 5.0, 5.0, 9.0]);
     }
 
     #[test]
@@ -298,6 +295,8 @@ mod tests {
         let mut holes = vec![ring(&hole), ring(&turned), ring(&[[5, 5], [6, 5], [5, 6]])];
         assert!(!remove_repeated(&outline, &mut holes));
         assert_eq!(holes.len(), 2);
+        let heights: Vec<f64> = holes[0].iter().map(|vertex| vertex[2]).collect();
+        assert_eq!(heights, [0.0, 1.0, 0.0, 1.0, 2.0, 3.0, 2.0, 3.0]);
         assert!(remove_repeated(&outline, &mut vec![ring(&[C, B, A, D])]));
     }
 

@@ -221,3 +221,86 @@ fn the_shore_of_the_sea_and_rivers_that_flow_into_it_are_not_doubtful() {
         assert!(!text.contains("height"), "{text}");
     }
 }
+
+/// Returns what a job says about these features on points at these heights, which may differ from point to point.
+fn said_on(features: &Features, rest: &str, height: impl Fn(f64, f64, u32) -> f64) -> String {
+    let survey = Survey::new(1);
+    let cloud = survey.folder().join("grid.csv");
+    let row = |i: u32| {
+        let [x, y] = [i % 80, i / 80].map(|at| f64::from(at) * 2.0);
+        format!("{},{},{:.2}\n", 500_000.0 + x, 4_000_000.0 + y, height(x, y, i))
+    };
+    fs::write(&cloud, format!("x,y,z\n{}", (0..6400).map(row).collect::<String>())).unwrap();
+    let file = geojson(survey.folder(), "lines.geojson", features);
+    let job = Job::on::<&Path>(&[&cloud]).with("input", "crs = \"EPSG:32633\"");
+    job.with("[breaklines]", &format!("files = [{file:?}]\n{rest}")).run_with(&["check"]).succeeded().out
+}
+
+/// Returns lines across the grid.
+fn across(height: impl Fn(f64, f64) -> f64) -> Features {
+    let vertex = |i: u32, y: f64| [11.0 + 9.0 * f64::from(i), y, height(11.0 + 9.0 * f64::from(i), y)];
+    let line = |y: u32| ("line", (0..15).map(|i| vertex(i, 7.0 + 15.0 * f64::from(y))).collect());
+    Features::lines(&(0..9).map(line).collect::<Vec<_>>())
+}
+
+fn low_land(x: f64, y: f64) -> f64 {
+    1.6 + 0.5 * (x / 25.0).sin() * (y / 30.0).sin()
+}
+
+/// They are nearer to the terrain than roofs and bridges.
+#[test]
+fn another_unit_on_low_land_and_under_trees_is_named() {
+    let seems = "lines.geojson: its heights seem to be in feet, and those of the points in metres";
+    let low =
+        |factor: f64, more: f64| said_on(&across(|x, y| low_land(x, y) * factor + more), "", |x, y, _| low_land(x, y));
+    let text = low(1.0 / FOOT, 0.0);
+    assert!(text.contains(seems), "{text}");
+    for more in [0.0, 3.7, -2.0] {
+        let text = low(1.0, more);
+        assert!(!text.contains("height"), "{more}: {text}");
+    }
+    let trees =
+        |x: f64, y: f64, i: u32| 5.0 + x / 20.0 + y / 50.0 + f64::from((i * 7919 % 100).saturating_sub(30)) * 0.4;
+    let in_forest = |factor: f64| said_on(&across(|x, y| (5.0 + x / 20.0 + y / 50.0) * factor), "", trees);
+    let text = in_forest(1.0 / FOOT);
+    assert!(text.contains(seems), "{text}");
+    let text = in_forest(1.0);
+    assert!(!text.contains("height"), "{text}");
+    // Two neighbours without a height.
+    let ground = |x: f64, y: f64| if (60.0..80.0).contains(&x) && y < 10.0 { 0.0 } else { 12.0 + x / 20.0 };
+    let text = said_on(&across(ground), "", |x, _, i| 7.0 + trees(x, 0.0, i));
+    assert!(text.contains("feature 1 has the height 0 at (500065, 4000007)"), "{text}");
+}
+
+#[test]
+fn a_constant_factor_is_named() {
+    let survey = Survey::new(2_000);
+    for (factor, words) in [
+        (1e3, "its heights seem to be in millimetres"),
+        (100.0, "its heights seem to be in centimetres"),
+        (10.0, "its heights seem to be in decimetres"),
+        (1.0 / 0.0254, "its heights seem to be in inches"),
+        (FOOT.powi(-2), "its heights are 10.76 times too high, as if they had been converted"),
+    ] {
+        let text = said(&survey, on_slope(|_, z| z * factor), "");
+        assert!(text.contains(words) && !text.contains("another zero"), "{factor}: {text}");
+    }
+}
+
+/// On a dam, points are as high as the water.
+#[test]
+fn a_lake_above_all_of_its_shore_is_named() {
+    let lake = |z: f64| {
+        let shore = (0..24).map(|i| f64::from(i) * std::f64::consts::TAU / 24.0);
+        Features::areas(&[("lake", vec![shore.map(|t| [80.0 + 30.0 * t.cos(), 80.0 + 30.0 * t.sin(), z]).collect()])])
+    };
+    let dam = |x: f64, y: f64| (6.6 - ((x - 80.0).hypot(y - 80.0) - 33.0).abs() / 2.0).max(2.0);
+    let plain = |z: f64, rest: &str| said_on(&lake(z), rest, |x, _, _| 2.0 + x / 500.0);
+    let text = plain(6.5, "kind = \"lake\"");
+    assert!(text.contains("lines.geojson: feature 1 has the height 6.5 at (500110, 4000080)"), "{text}");
+    for text in
+        [plain(2.9, "kind = \"lake\""), plain(6.5, ""), said_on(&lake(6.5), "kind = \"lake\"", |x, y, _| dam(x, y))]
+    {
+        assert!(!text.contains("height"), "{text}");
+    }
+}

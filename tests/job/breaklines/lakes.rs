@@ -82,8 +82,8 @@ fn what_encloses_nothing_or_is_no_area_is_named() {
             &[[&square[..], &[[40.0, 40.0], [70.0, 40.0]], &square[1..]].concat()],
             "lakes whose outlines enclose nothing",
         ),
-        (&[flat], "1 features have no two different vertices"),
-        (&[back], "1 features have no two different vertices"),
+        (&[flat], "1 features are areas whose outline encloses nothing"),
+        (&[back], "1 features are areas whose outline encloses nothing"),
     ] {
         let (said, _) = run(&survey, &[rings]);
         assert!(said.code == 0 && said.out.contains(words), "{}", said.out);
@@ -96,6 +96,20 @@ fn what_encloses_nothing_or_is_no_area_is_named() {
     }
     let (said, _) = run(&survey, &[&[square], &[island]]);
     assert!(said.out.contains("lie inside a lake"), "{}", said.out);
+}
+
+/// Of two heights at a vertex, the lake would take the lower one without a word.
+#[test]
+fn heights_of_an_outline_that_is_run_through_twice_are_compared() {
+    let survey = Survey::new(500);
+    let at = |z: f64| SQUARE.map(|[x, y]| [x, y, z]).to_vec();
+    for (again, is_named) in [(5.0, false), (4.5, true)] {
+        let features = Features::areas(&[("lake", vec![[at(5.0), at(again)].concat()])]);
+        let job = survey.job_with(&[geojson(survey.folder(), "twice.geojson", &features)], "kind = \"lake\"");
+        let text = job.run_with(&["check"]).succeeded().out;
+        assert_eq!(text.contains("1 lakes are not flat; the worst is feature 1 of"), is_named, "{text}");
+        assert_eq!(text.contains("which is 0.5 higher"), is_named, "{text}");
+    }
 }
 
 /// A Shapefile has one list of rings.

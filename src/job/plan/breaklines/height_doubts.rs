@@ -36,6 +36,10 @@ const SPIKE: f64 = 10.0;
 /// Any vertex is doubtful if it lies so many metres beyond the terrain.
 const BEYOND: f64 = 50.0;
 
+/// A lake is doubtful if it lies so many metres above the points on most of its shore, and so many times their relief.
+const ABOVE_SHORE: f64 = 1.0;
+const TIMES_RELIEF: f64 = 10.0;
+
 /// So many vertices of a feature are looked at, evenly.
 const EVENLY: usize = 16;
 
@@ -172,25 +176,44 @@ impl Judge<'_> {
 
     /// Returns the first vertex of a feature whose height is no height of the terrain around.
     fn doubtful_vertex<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around, Doubt)> {
-        self.missing_height(feature).or_else(|| self.far_vertex(feature))
+        self.missing_height(feature).or_else(|| self.far_vertex(feature)).or_else(|| self.high_lake(feature))
     }
 
     /// Returns the first vertex of a feature whose height seems to be missing: it is 0, or a number for none, and the terrain lies elsewhere.
     fn missing_height<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around, Doubt)> {
-        let vertices = || feature.paths.iter().flatten();
-        let is_all_zero = vertices().all(|vertex| vertex.z.is_none() || self.terrain.is_zero(vertex));
+        let mut vertices = feature.paths.iter().flatten();
+        let is_all_zero = vertices.all(|vertex| vertex.z.is_none() || self.terrain.is_zero(vertex));
         let from_zero = self.terrain.in_height_unit(FROM_ZERO[usize::from(is_all_zero)]);
         // All of a lake gets its lowest height, wherever that is.
         let fall = if feature.kind == FeatureKind::Lake { 0.0 } else { FALL };
-        let missing = vertices().filter_map(|vertex| {
-            let is_zero = self.terrain.is_zero(vertex);
-            (is_zero || self.is_nodata(vertex)).then_some((vertex, if is_zero { Doubt::Zero } else { Doubt::Nodata }))
-        });
-        missing.take(OF_FEATURE).find_map(|(vertex, doubt)| {
+        let places = feature.paths.iter().flat_map(|path| (0..path.len()).map(move |at| (path, at)));
+        let missing = places.filter_map(|(path, at)| Some((path, at, self.missing_in(path.get(at)?)?)));
+        missing.take(OF_FEATURE).find_map(|(path, at, doubt)| {
+            let vertex = path.get(at)?;
             let (around, outside) = self.terrain.beside(vertex.place)?;
-            let least = from_zero + around.relief() + fall * outside;
-            (around.beyond(self.terrain.height(vertex)?).abs() > least).then_some((vertex, around, doubt))
+            let beyond = around.beyond(self.terrain.height(vertex)?);
+            // Trees have a relief of their own. Between two vertices on the ground, it makes no difference.
+            let is_between = self.known_beside(path, at).is_some_and(|known| {
+                known.iter().all(|z| around.beyond(*z).abs() < from_zero && (z - around.lowest).abs() < beyond.abs())
+            });
+            let gentle = if is_between { FALL * around.reach } else { f64::INFINITY };
+            let slack = around.relief().min(gentle);
+            (beyond.abs() > from_zero + slack + fall * outside).then_some((vertex, around, doubt))
         })
+    }
+
+    /// Returns why the height of a vertex may be missing.
+    fn missing_in(&self, vertex: &Vertex) -> Option<Doubt> {
+        let nodata = || self.is_nodata(vertex).then_some(Doubt::Nodata);
+        self.terrain.is_zero(vertex).then_some(Doubt::Zero).or_else(nodata)
+    }
+
+    /// Returns the nearest heights before and after a vertex that are not missing.
+    fn known_beside(&self, path: &[Vertex], at: usize) -> Option<[f64; 2]> {
+        let (before, after) = path.split_at_checked(at)?;
+        let is_known = |vertex: &&Vertex| self.missing_in(vertex).is_none();
+        let [before, after] = [before.iter().rev().find(is_known)?, after.iter().find(is_known)?];
+        Some([self.terrain.height(before)?, self.terrain.height(after)?])
     }
 
     /// Tells whether the height of a vertex is a number that programs write for none.
@@ -211,6 +234,19 @@ impl Judge<'_> {
             let is_far = around.beyond(z).abs() > least + around.relief() + around.reach;
             (is_far && !self.terrain.is_zero(vertex)).then_some((vertex, around, Doubt::Far))
         })
+    }
+
+    /// Returns a vertex of a lake that lies above the points on most of its shore. Those on a dam would be as high as the water.
+    fn high_lake<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around, Doubt)> {
+        let above = |vertex: &'f Vertex| {
+            let (z, around) = self.terrain.pair(vertex)?;
+            let least = self.terrain.in_height_unit(ABOVE_SHORE).max(TIMES_RELIEF * around.relief());
+            Some((vertex, around, around.beyond(z) - least.max(FALL * around.reach)))
+        };
+        let on_shore: Vec<_> = evenly(feature).filter_map(above).collect();
+        let is_high = feature.kind == FeatureKind::Lake && median(on_shore.iter().map(|(_, _, more)| *more))? > 0.0;
+        let (vertex, around, _) = on_shore.into_iter().find(|(_, _, more)| is_high && *more > 0.0)?;
+        Some((vertex, around, Doubt::Far))
     }
 }
 

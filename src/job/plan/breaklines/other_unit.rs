@@ -3,7 +3,7 @@
 use crate::breaklines::Feature;
 use crate::input::Unit;
 use crate::job::plan::breaklines::height_doubts::{median, middles};
-use crate::job::plan::breaklines::terrain::{Pair, SampledTerrain};
+use crate::job::plan::breaklines::terrain::{Around, Pair, SampledTerrain};
 
 /// Heights of a file in another unit are so many times nearer to the terrain when they are converted, and were farther from it than so many
 /// metres, or fewer where they rise and fall with it.
@@ -24,6 +24,16 @@ const ON_GROUND: f64 = 0.5;
 /// Of the features that lie off the terrain, so many in a hundred fit when they are converted. Of many roofs and bridges, a few do by chance.
 const MOST: usize = 80;
 
+/// So many heights are a multiple of those of the terrain if they vary by more than this, in metres, and lie so many times nearer to it when they
+/// are divided than when they are shifted. No roofs, bridges or dams do that, however near to the ground they are.
+const ENOUGH: usize = 8;
+const LEAST_VARIATION: f64 = 0.2;
+const TIMES_NEARER_THAN_SHIFTED: f64 = 2.5;
+
+/// Units, and their lengths in metres, that `height_unit` does not have.
+const OTHER_UNITS: [(&str, f64); 4] =
+    [("millimetres", 1e-3), ("centimetres", 1e-2), ("decimetres", 0.1), ("inches", 0.0254)];
+
 /// Units are the same if they differ by less than this part: it is far more than between the two feet.
 const SAME_UNIT: f64 = 1e-4;
 
@@ -37,7 +47,17 @@ pub(super) struct UnitJudge<'a> {
 impl UnitJudge<'_> {
     /// Returns a sentence if the heights of a file seem to be in another unit.
     pub(super) fn of_file(&self, pairs: &[Pair]) -> Option<String> {
-        let factor = self.factors().into_iter().find(|factor| self.fits(pairs, *factor).unwrap_or(false))?;
+        self.feet_or_metres(pairs).or_else(|| self.constant_factor(pairs))
+    }
+
+    fn feet_or_metres(&self, pairs: &[Pair]) -> Option<String> {
+        let fitting = self.factors().into_iter().find(|factor| self.fits(pairs, *factor).unwrap_or(false));
+        // Where points of trees are kept too, the ground is the low side of the points around.
+        let low_side: Vec<Pair> =
+            pairs.iter().map(|(z, around)| (*z, Around { middle: around.lowest, ..*around })).collect();
+        let multiple = |pairs| Some((self.multiple(pairs, self.factors())?, pairs));
+        let (factor, pairs) =
+            fitting.map(|factor| (factor, pairs)).or_else(|| [pairs, &low_side].into_iter().find_map(multiple))?;
         let [line, points] = middles(pairs)?;
         let numbers = format!("in the middle {line}, where that of the points around is {points}");
         Some(match self.unit_of_lines(factor) {
@@ -55,6 +75,26 @@ impl UnitJudge<'_> {
                 self.unit_of_points().name()
             ),
         })
+    }
+
+    /// Returns a sentence if the heights of a file are a multiple of those of the terrain that no option converts.
+    fn constant_factor(&self, pairs: &[Pair]) -> Option<String> {
+        let factors = OTHER_UNITS.map(|(_, metres)| metres * self.terrain.in_height_unit(1.0) / self.scale);
+        let twice = self.factors().map(|factor| factor * factor);
+        let factor = self.multiple(pairs, factors.into_iter().chain(twice))?;
+        let [line, points] = middles(pairs)?;
+        let unit = OTHER_UNITS.iter().zip(factors).find(|(_, other)| *other == factor);
+        let what = match unit {
+            Some(((unit, _), _)) => format!("seem to be in {unit}"),
+            None => format!(
+                "are 10.76 times too {}, as if they had been converted between feet and metres twice",
+                if factor < 1.0 { "high" } else { "low" }
+            ),
+        };
+        Some(format!(
+            "its heights {what}: in the middle {line}, where that of the points around is {points}; convert them, or set heights = \"points\" \
+             in [[breaklines]] to take them from the points around"
+        ))
     }
 
     /// Returns the numbers of the features that seem to be in another unit, and a sentence about them. `pairs` are those of each.
@@ -155,6 +195,19 @@ impl UnitJudge<'_> {
         let is_on_ground = converted <= 2.0 * relief || !is_more_than(converted, LEAST_RISE);
         let is_far = is_more_than(as_written, FAR_APART) && as_written > FEATURE_NEARER * converted;
         Some(as_written > TIMES_NEARER * converted && !is_shifted && is_apart && (is_on_ground || is_far))
+    }
+
+    /// Returns that of the `factors` by which heights are multiplied to be those of the terrain, if they vary as these do.
+    fn multiple(&self, pairs: &[Pair], factors: impl IntoIterator<Item = f64>) -> Option<f64> {
+        let shift = median(pairs.iter().map(|(z, around)| z - around.middle))?;
+        let shifted = median(pairs.iter().map(|(z, around)| (z - around.middle - shift).abs()))?;
+        let apart = |factor: f64| median(pairs.iter().map(move |(z, around)| (z * factor - around.middle).abs()));
+        let varies = pairs.len() >= ENOUGH && shifted > self.terrain.in_height_unit(LEAST_VARIATION);
+        // Small numbers are near to each other, so both sides are compared with the terrain and with themselves.
+        let fits = |(factor, apart): &(f64, f64)| shifted > TIMES_NEARER_THAN_SHIFTED * apart * factor.recip().max(1.0);
+        let fitting = factors.into_iter().filter_map(|factor| Some((factor, apart(factor)?))).filter(fits);
+        let (factor, _) = fitting.filter(|_| varies).min_by(|one, other| one.1.total_cmp(&other.1))?;
+        Some(factor)
     }
 
     /// Tells whether a feature lies off the terrain.
