@@ -176,6 +176,7 @@ impl InputOptions {
             // Bounds are in the system of the job, which the rows of a text may have to be transformed into.
             bounds: self.bounds.filter(|_| self.to_crs.is_none()).map(|bounds| bounds.0),
             is_transformed: self.to_crs.is_some(),
+            is_foot_stated: matches!(self.unit, UnitChoice::Foot | UnitChoice::UsFoot),
             classes: self.kept_classes(),
             strict_classes: self.chooses_classes(),
             returns: self.kept_returns(),

@@ -41,6 +41,8 @@ pub struct RowChoice {
     pub bounds: Option<[f64; 4]>,
     /// Whether the job transforms coordinates, so that degrees are nothing to warn about.
     pub is_transformed: bool,
+    /// Whether the user states which foot the coordinates are in.
+    pub is_foot_stated: bool,
     /// Only rows of these classes.
     pub classes: [bool; 256],
     /// Whether the user has said which classes. If not, a class that cannot be read counts as 0.
@@ -63,6 +65,7 @@ impl RowChoice {
         RowChoice {
             bounds: None,
             is_transformed: false,
+            is_foot_stated: false,
             classes: [true; 256],
             strict_classes: false,
             returns: KeptReturns::All,
