@@ -100,6 +100,15 @@ pub(crate) fn line_for_damage(draft: &Draft, damage: &Damage) -> Option<NeededLi
     Some(NeededLine::of_input("max_malformed_fraction", fraction(*malformed, *records), &why))
 }
 
+/// Returns the line that allows for `malformed` of `records` records, as the job stops with `error`; `None` if nothing else is there.
+pub(crate) fn line_for_malformed(draft: &Draft, [malformed, records]: [u64; 2], error: &Error) -> Option<NeededLine> {
+    if malformed >= records || draft.sets("max_malformed_fraction") {
+        return None;
+    }
+    let why = format!("The job stops: {error}. To leave such points out, remove the #.");
+    Some(NeededLine::of_input("max_malformed_fraction", fraction(malformed, records), &why))
+}
+
 /// Returns the least fraction of few digits that allows `bad` of `all` records.
 fn fraction(bad: u64, all: u64) -> f64 {
     // The number that these digits stand for.

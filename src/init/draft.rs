@@ -28,7 +28,7 @@ impl NeededLine {
 
     /// Tells whether the user decides on this line, because it loses points that another copy of the file may have.
     fn loses_points(&self) -> bool {
-        self.key == "max_malformed_fraction"
+        ["max_malformed_fraction", "nodata"].contains(&self.key)
     }
 
     pub(crate) fn of_limits(key: &'static str, value: impl Into<toml::Value>, why: &str) -> NeededLine {

@@ -8,6 +8,7 @@ mod clouds;
 mod config_file;
 mod config_folder;
 mod configuration;
+mod doubtful_heights;
 mod draft;
 mod findings;
 mod folder_files;

@@ -1,7 +1,8 @@
 //! What the clouds need so that a job of them runs. Each way is one that the program's own messages name, and each is tried as `check`
 //! would try it.
 
-use crate::init::bad_files::{Damage, line_for_damage, lines_for_bad_files};
+use crate::init::bad_files::{Damage, line_for_damage, line_for_malformed, lines_for_bad_files};
+use crate::init::doubtful_heights::line_for_nodata;
 use crate::init::draft::{Draft, NeededLine};
 use crate::init::offers::Offers;
 use crate::init::refusals::Refusals;
@@ -54,7 +55,10 @@ pub(crate) fn runnable(draft: Draft) -> Result<Runnable> {
                 (damage.error, next)
             }
             Err(error @ Error::Input { .. }) => {
-                let next = lines_for_bad_files(&now)?.map(|lines| now.with(lines));
+                let next = match lines_for_bad_files(&now)? {
+                    Some(lines) => Some(now.with(lines)),
+                    None => line_for_far_points(&now, &error).map(|line| now.with([line])),
+                };
                 (error, next)
             }
             Err(error @ Error::Config(_)) => {
@@ -65,7 +69,10 @@ pub(crate) fn runnable(draft: Draft) -> Result<Runnable> {
                 let next = ways.next();
                 (error, next)
             }
-            Err(error @ Error::NoTerrain(_)) => (error, None),
+            Err(error @ Error::NoTerrain(_)) => {
+                let next = line_for_nodata(&now, &error).map(|line| now.with([line]));
+                (error, next)
+            }
             Err(error) => return Err(error),
         };
         refusals.add(&now, error);
@@ -92,6 +99,16 @@ fn trial(draft: &Draft) -> Result<Trial> {
         return Err(no_triangle(&plan));
     }
     Ok(Trial::Runs(Box::new((preflight, plan))))
+}
+
+/// Returns the line that lets the job leave out points far from all others; `None` if `error` is none that such points cause.
+fn line_for_far_points(draft: &Draft, error: &Error) -> Option<NeededLine> {
+    let any = NeededLine::of_input("max_malformed_fraction", 1.0, "");
+    let allowing = Some(draft.with([any])).filter(|_| !draft.sets("max_malformed_fraction"))?;
+    let (_, plan) = look(&allowing.options().ok()?).ok()?;
+    let counts = |input: &PlannedInput| count(&input.source, &input.rules).map(|counts| counts.malformed);
+    let malformed = plan.inputs.par_iter().map(counts).collect::<Result<Vec<_>>>().ok()?.into_iter().sum();
+    line_for_malformed(draft, [malformed, plan.records], error)
 }
 
 /// Reads all points, and returns how many records are damaged if they are more than the options allow.

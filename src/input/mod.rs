@@ -50,7 +50,9 @@ pub use measured::{MeasuredPoints, PlausiblePoints};
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;
 pub use points::kept_heights::KeptHeights;
-pub(crate) use points::nodata::{DoubtfulHeight, Extremes, is_nodata_beside, is_number_in_steps, shown_height};
+pub(crate) use points::nodata::{
+    DoubtfulHeight, Extremes, is_nodata_beside, is_number_in_steps, shown_height, who_has,
+};
 pub use points::nodata_choice::NodataChoice;
 pub use points::optional_fields::OptionalFields;
 pub use points::point::Point;

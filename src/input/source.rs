@@ -311,10 +311,21 @@ impl Source {
         Ok(())
     }
 
-    /// Takes over where the others lie, and what to do about the outliers of a binary file.
+    /// Takes over where the others lie, and what to do about the outliers.
     pub fn set_remedy(&mut self, remedy: &str) {
-        if let Some(measured) = &mut self.measured {
-            measured.remedy = remedy.into();
+        match (&mut self.points, &mut self.measured) {
+            (PointData::Text(table), _) => table.set_remedy(remedy),
+            (_, Some(measured)) => measured.remedy = remedy.into(),
+            _ => {}
+        }
+    }
+
+    /// Returns the box of the points that the job wants, outliers included, as far as they were looked at.
+    pub fn box_with_outliers(&self) -> Option<[[f64; 3]; 2]> {
+        match &self.points {
+            // That of a text is in its own system.
+            PointData::Text(table) => table.box_with_outliers().filter(|_| self.transform.is_none()),
+            _ => self.measured.as_ref()?.all,
         }
     }
 

@@ -439,6 +439,10 @@ fn northings_that_are_as_great_as_the_radius_of_the_earth_are_no_geocentric_coor
     let folder = tempfile::tempdir().unwrap();
     let file = write(folder.path(), "north.las", &[keys(&[[2048, 0, 1, 4978]])]);
     move_to(&file, [560_000.0, 6_353_000.0, 20.0]);
+    // The points reach 200 m from there.
+    let mut bytes = fs::read(&file).unwrap();
+    [131, 139].into_iter().for_each(|at| bytes[at..at + 8].copy_from_slice(&0.1f64.to_le_bytes()));
+    fs::write(&file, bytes).unwrap();
     let said = warnings(&Job::on(&[&file]).report());
     assert!(said.contains("is geocentric, but its points would stand upright near the equator"), "{said}");
 }

@@ -243,3 +243,34 @@ fn nodata_in_feet_is_known_in_a_job_in_metres() {
     let report = job().with("input", "nodata = -9999").report();
     assert_eq!(number(&report["points"]["nodata"]), 60, "{report}");
 }
+
+#[test]
+fn the_heights_of_the_advice_are_those_of_all_files() {
+    let files = Files::new();
+    let valley = files.grid("valley.las", 0, &hills(750, |_| 600_000));
+    let mount: Vec<i32> = hills(POINTS, |_| 90_000).iter().map(|height| height + 100_000).collect();
+    let mount = files.grid("mount.xyz", 50, &mount);
+    warns(
+        &[&valley, &mount],
+        &["valley.las: 2 points have the height 6000", "[input] heights = [840, 1960] leaves them out"],
+    );
+    let beyond = files.grid("beyond.xyz", 100, &[599_000, 600_000, 601_000].repeat(200));
+    warns(&[&valley, &beyond], &["valley.las", "remove them from the file: [input] heights holds for all files"]);
+    let job = Job::on(&[&valley, &mount]).with("input", "heights = [840, 960]");
+    let warnings = job.report()["warnings"].to_string();
+    assert!(
+        warnings.contains("mount.xyz: no point of a sample lies within [input] heights = [840, 960]"),
+        "{warnings}"
+    );
+    assert!(!warnings.contains("valley.las"), "{warnings}");
+}
+
+#[test]
+fn a_height_alone_that_no_lattice_holds_is_left_out_by_heights() {
+    let files = Files::new();
+    let path = files.grid("a.xyz", 0, &hills(POINTS, |_| 90_000));
+    let text = fs::read_to_string(&path).unwrap() + "500020 4000020 111399000.00\n";
+    let path = files.write("a.xyz", text);
+    Job::on(&[&path]).run().refused(3, &["lies far from all other rows", "[input] heights = ["]);
+    Job::on(&[&path]).with("input", "heights = [840, 960]").run().succeeded();
+}

@@ -6,12 +6,21 @@ use serde::{Deserialize, Serialize};
 /// The fewest units between a number that stands for nodata and the nearest height.
 const FAR: f64 = 100.0;
 
-/// The fewest units between any other value that may stand for nodata and the nearest height, at the foot of all heights. The sea lies at the
+/// The fewest metres between any other value that may stand for nodata and the nearest height, at the foot of all heights. The sea lies at the
 /// foot of cliffs, and a lake in a quarry.
 const DOUBTFUL_LOW: f64 = 100.0;
 
 /// The same at the top, where buildings stand out.
 const DOUBTFUL_HIGH: f64 = 500.0;
+
+/// Fewer metres below all others such a value is less doubtful: harbours and lakes have an even surface. It lies at least so many metres below,
+const LEAST_GAP: f64 = 5.0;
+
+/// and so many times as far as all others spread.
+const TIMES_RANGE: f64 = 8.0;
+
+/// Heights within so many units of a value are next to it, unless their own range is smaller.
+const NEXT: f64 = 5.0;
 
 /// Such a value is so many times as far from the nearest height as the heights there lie apart: a shore would join it to them.
 const ALONE: f64 = 10.0;
@@ -35,8 +44,9 @@ const TIMES_STRAYS: u64 = 10;
 /// No height is as large, whatever its unit.
 pub(crate) const NO_HEIGHT: f64 = 1e18;
 
-/// The greatest numbers of single and of double precision, and half of the first, which programs write with more or fewer digits.
-const ENDS_OF_FLOATS: [f64; 3] = [f32::MAX as f64, f64::MAX, 1.701_411_834_6e38];
+/// The greatest numbers of single and of double precision, half of the first, and the fill value of NetCDF. Programs write them with more or
+/// fewer digits.
+const HUGE_NUMBERS: [f64; 4] = [f32::MAX as f64, f64::MAX, 1.701_411_834_6e38, 9.969_209_968_386_869e36];
 
 /// The ends of 16 and of 32 bits, and those that some programs keep for nodata beside them.
 const ENDS_OF_INTEGERS: [f64; 6] = [-32768.0, -32767.0, 32767.0, -2_147_483_648.0, -2_147_483_647.0, 2_147_483_647.0];
@@ -45,7 +55,7 @@ const ENDS_OF_INTEGERS: [f64; 6] = [-32768.0, -32767.0, 32767.0, -2_147_483_648.
 pub(crate) fn is_nodata_number(value: f64) -> bool {
     let least_digits = if value < 0.0 { 3 } else { 4 };
     let is_nines = || (least_digits..=15).any(|digits| value.abs() == power_of_ten(digits) - 1.0);
-    let is_end = || ENDS_OF_FLOATS.into_iter().any(|end| (value.abs() / end - 1.0).abs() < 1e-4);
+    let is_end = || HUGE_NUMBERS.into_iter().any(|end| (value.abs() / end - 1.0).abs() < 1e-4);
     ENDS_OF_INTEGERS.contains(&value) || is_nines() || is_great_power_of_ten(value.abs()) || is_end()
 }
 
@@ -74,7 +84,7 @@ pub(crate) struct SharedHeight {
 }
 
 /// The lowest and the highest values of heights, and how many records have each.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Extremes {
     lowest: Lowest,
     /// With the other sign.
@@ -82,7 +92,7 @@ pub(crate) struct Extremes {
 }
 
 /// The lowest values, ascending.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Lowest(Vec<SharedHeight>);
 
 impl Lowest {
@@ -117,7 +127,7 @@ impl Lowest {
 }
 
 /// A value that may stand for nodata, though it is none of the numbers that programs write for it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct DoubtfulHeight {
     pub(crate) height: SharedHeight,
     /// Where all other heights lie.
@@ -151,6 +161,13 @@ impl Extremes {
         let moved = |height: &SharedHeight| SharedHeight { first: height.first.saturating_add(before), ..*height };
         other.lowest.0.iter().for_each(|height| self.lowest.see(moved(height)));
         other.highest.0.iter().for_each(|height| self.highest.see(moved(height)));
+    }
+
+    /// Returns these heights with numbers that count from `before`.
+    pub(crate) fn after(&self, before: u64) -> Extremes {
+        let mut moved = Extremes::default();
+        moved.add(self, before);
+        moved
     }
 
     /// Returns these heights in other units.
@@ -199,21 +216,47 @@ impl Extremes {
 
     /// Returns the lowest or the highest value if several records share it, and nothing joins it to the other heights: it lies farther from
     /// them than they lie from each other, or, at their foot, much farther than the nearest of them do. It may stand for nodata, such as 0
-    /// among mountains.
-    pub(crate) fn doubtful(&self) -> Option<DoubtfulHeight> {
+    /// among mountains. A unit of heights is so many `metres`.
+    pub(crate) fn doubtful(&self, metres: f64) -> Option<DoubtfulHeight> {
         let [few_low, few_high] = FEW;
+        let [least_low, least_high] = [DOUBTFUL_LOW, DOUBTFUL_HIGH].map(|least| least / metres);
         let low = self.lowest.doubtful(&self.highest, few_low, |height, above, others| {
-            is_apart_from(above, height, DOUBTFUL_LOW) || is_far(height, others, DOUBTFUL_LOW)
+            is_apart_from(above, height, least_low) || is_far(height, others, least_low)
         });
         let high = || {
             let found = self
                 .highest
-                .doubtful(&self.lowest, few_high, |height, _, others| is_far(height, others, DOUBTFUL_HIGH))?;
+                .doubtful(&self.lowest, few_high, |height, _, others| is_far(height, others, least_high))?;
             let [low, high] = found.others;
             let height = SharedHeight { value: 0.0 - found.height.value, ..found.height };
             Some(DoubtfulHeight { height, others: [0.0 - high, 0.0 - low] })
         };
         low.or_else(high)
+    }
+
+    /// Returns the lowest value if several records share it, and it lies below all others by many times their range. Nearer than a
+    /// [`Extremes::doubtful`] one, it may be water.
+    pub(crate) fn set_apart(&self, metres: f64) -> Option<DoubtfulHeight> {
+        self.lowest.doubtful(&self.highest, FEW[0], |height, _, [low, high]| {
+            let gap = low - height;
+            gap * metres >= LEAST_GAP && gap >= TIMES_RANGE * (high - low)
+        })
+    }
+
+    /// Returns warnings about the heights of records that the user takes for nodata, and that other heights of the file are next to.
+    pub(crate) fn next_to(&self, others: &Extremes, record: &str) -> Vec<String> {
+        let (Some(low), Some(high)) = (others.lowest.0.first(), others.highest.0.first()) else { return Vec::new() };
+        let range = [low.value, 0.0 - high.value];
+        let is_next = |value: f64| {
+            let is_apart = is_apart_from(&others.lowest.0, value, NEXT);
+            !is_apart && !is_apart_from(&others.highest.0, 0.0 - value, NEXT) && !is_far(value, range, 0.0)
+        };
+        self.lowest
+            .0
+            .iter()
+            .filter(|height| is_next(height.value))
+            .map(|height| real_nodata(height, range, record))
+            .collect()
     }
 }
 
@@ -280,17 +323,29 @@ pub(crate) fn shown_height(value: f64) -> String {
     if value.abs() >= NO_HEIGHT { format!("{value:e}") } else { value.to_string() }
 }
 
-/// Returns a warning about a height that stands for nodata. Records of the file are called `record`.
-pub(crate) fn left_out(SharedHeight { value, count, first }: &SharedHeight, record: &str) -> String {
+/// Returns how many records have a height, and which is the first of them.
+pub(crate) fn who_has(SharedHeight { value, count, first }: &SharedHeight, record: &str) -> String {
     let height = shown_height(*value);
-    let (records, first) = match count {
-        1 => (format!("{record} {first} has"), String::new()),
-        _ => (format!("{count} {record}s have"), format!(" (the first is {record} {first})")),
-    };
+    match count {
+        1 => format!("{record} {first} has the height {height}"),
+        _ => format!("{count} {record}s have the height {height} (the first is {record} {first})"),
+    }
+}
+
+fn real_nodata(height: &SharedHeight, [low, high]: [f64; 2], record: &str) -> String {
     format!(
-        "{records} the height {height}{first}, which stands for nodata, far from all other heights: left out; [input] nodata = \"none\" \
-         keeps such points"
+        "{}, which [input] nodata leaves out, though the other heights of the file, from {low} to {high}, are next to it: such points may be \
+         real, as those of the sea. nodata holds for all files: if they are real, remove it, and the points without a height from the other \
+         files",
+        who_has(height, record)
     )
+}
+
+/// Returns a warning about a height that stands for nodata. Records of the file are called `record`.
+pub(crate) fn left_out(height: &SharedHeight, record: &str) -> String {
+    // Nothing keeps a height that no lattice holds.
+    let remedy = if height.value.abs() < NO_HEIGHT { "; [input] nodata = \"none\" keeps such points" } else { "" };
+    format!("{}, which stands for nodata, far from all other heights: left out{remedy}", who_has(height, record))
 }
 
 #[cfg(test)]
@@ -321,6 +376,7 @@ mod tests {
             -3.4028235e38,
             -3.40282e38,
             1.70141e38,
+            9.96921e36,
             f64::MIN,
             1e10,
         ];
@@ -363,29 +419,61 @@ mod tests {
     fn a_value_that_several_records_share_far_from_all_heights_is_doubtful() {
         let peaks = || (0..500).map(|i| 1500.0 + f64::from(i % 97));
         let zeros = |count: usize| std::iter::repeat_n(0.0, count);
-        let doubt = extremes(zeros(7).chain(peaks())).doubtful().unwrap();
+        let doubt = extremes(zeros(7).chain(peaks())).doubtful(1.0).unwrap();
         assert_eq!((doubt.height.value, doubt.height.count, doubt.others), (0.0, 7, [1500.0, 1596.0]));
-        let doubt = extremes(peaks().chain([5000.0; 9])).doubtful().unwrap();
+        let doubt = extremes(peaks().chain([5000.0; 9])).doubtful(1.0).unwrap();
         assert_eq!((doubt.height.value, doubt.height.first), (5000.0, 500));
         let alps = || (0..5000).map(|i| 800.0 + 0.5 * f64::from(i));
-        assert_eq!(extremes(zeros(5).chain(alps())).doubtful().map(|doubt| doubt.others), Some([800.0, 3299.5]));
-        assert_eq!(extremes(zeros(3).chain(peaks())).doubtful().map(|doubt| doubt.height.count), Some(3));
-        assert_eq!(extremes(zeros(2).chain(peaks())).doubtful(), None);
+        assert_eq!(extremes(zeros(5).chain(alps())).doubtful(1.0).map(|doubt| doubt.others), Some([800.0, 3299.5]));
+        assert_eq!(extremes(zeros(3).chain(peaks())).doubtful(1.0).map(|doubt| doubt.height.count), Some(3));
+        assert_eq!(extremes(zeros(2).chain(peaks())).doubtful(1.0), None);
         // Strays below and between join it to nothing.
         for strays in [[-40.0, 450.0], [-40.0, -300.0], [450.0, 780.0]] {
-            let doubt = extremes(zeros(100).chain(alps()).chain(strays)).doubtful();
+            let doubt = extremes(zeros(100).chain(alps()).chain(strays)).doubtful(1.0);
             assert_eq!(doubt.map(|doubt| doubt.height.value), Some(0.0), "{strays:?}");
         }
         assert_eq!(nodata([-9999.0; 50].into_iter().chain(alps()).chain([-6000.0, -5000.0])), [-9999.0]);
         // The sea, and a lake with a shore.
-        assert_eq!(extremes(zeros(200).chain((0..400).map(f64::from))).doubtful(), None);
-        assert_eq!(extremes(zeros(200).chain(peaks()).chain([700.0, 750.0, 800.0])).doubtful(), None);
-        assert_eq!(extremes(zeros(200).chain(alps()).chain([1.0, 30.0, 40.0])).doubtful(), None);
+        assert_eq!(extremes(zeros(200).chain((0..400).map(f64::from))).doubtful(1.0), None);
+        assert_eq!(extremes(zeros(200).chain(peaks()).chain([700.0, 750.0, 800.0])).doubtful(1.0), None);
+        assert_eq!(extremes(zeros(200).chain(alps()).chain([1.0, 30.0, 40.0])).doubtful(1.0), None);
         // The sea at the foot of a cliff, and a tower in a plain.
-        assert_eq!(extremes(zeros(200).chain((0..400).map(|i| 60.0 + f64::from(i) / 50.0))).doubtful(), None);
-        assert_eq!(extremes((0..400).map(|i| f64::from(i) / 50.0).chain([140.0; 9])).doubtful(), None);
+        assert_eq!(extremes(zeros(200).chain((0..400).map(|i| 60.0 + f64::from(i) / 50.0))).doubtful(1.0), None);
+        assert_eq!(extremes((0..400).map(|i| f64::from(i) / 50.0).chain([140.0; 9])).doubtful(1.0), None);
         // A platform and what stands on it.
-        assert_eq!(extremes(zeros(200).chain([100.0, 100.0, 100.5])).doubtful(), None);
+        assert_eq!(extremes(zeros(200).chain([100.0, 100.0, 100.5])).doubtful(1.0), None);
+    }
+
+    #[test]
+    fn a_value_many_times_as_far_below_all_heights_as_they_spread_is_set_apart() {
+        let plain = |zeros: usize, from: f64, range: f64| {
+            let others = (0..500).map(move |i| from + range * f64::from(i % 97) / 96.0);
+            extremes(std::iter::repeat_n(0.0, zeros).chain(others))
+        };
+        let value = |found: Option<DoubtfulHeight>| found.map(|doubt| doubt.height.value);
+        assert_eq!((value(plain(5, 85.0, 10.0).set_apart(1.0)), plain(5, 85.0, 10.0).doubtful(1.0)), (Some(0.0), None));
+        assert_eq!(value(plain(5, 60.0, 2.0).set_apart(1.0)), Some(0.0));
+        assert_eq!(value(plain(2, 60.0, 2.0).set_apart(1.0)), None);
+        assert_eq!(value(plain(50, 60.0, 8.0).set_apart(1.0)), None);
+        assert_eq!(value(plain(50, 4.0, 0.4).set_apart(1.0)), None);
+        // The same in millimetres, and in feet.
+        assert_eq!(value(plain(6, 500.0, 60.0).set_apart(0.001)), None);
+        assert_eq!(value(plain(6, 500.0, 60.0).doubtful(0.001)), None);
+        assert_eq!(value(plain(6, 500.0, 60.0).doubtful(0.3048)), Some(0.0));
+        assert_eq!(value(plain(6, 300.0, 60.0).doubtful(0.3048)), None);
+    }
+
+    #[test]
+    fn nodata_of_the_user_next_to_other_heights_is_told() {
+        let zeros = || extremes([0.0; 9]);
+        let coast = extremes((0..500).map(|i| 0.2 + 0.1 * f64::from(i)));
+        let told = zeros().next_to(&coast, "point");
+        assert!(told.len() == 1 && told[0].starts_with("9 points have the height 0 "), "{told:?}");
+        for from in [60.0, 900.0] {
+            let hills = extremes((0..500).map(|i| from + 0.1 * f64::from(i)));
+            assert!(zeros().next_to(&hills, "point").is_empty());
+        }
+        assert!(extremes([]).next_to(&coast, "point").is_empty());
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::geometry::lattice::shortest_decimal;
 use crate::input::points::axis::Axis;
 use crate::input::points::chunk_request::ChunkRequest;
 use crate::input::points::kept_heights::RawHeights;
-use crate::input::points::nodata::{DoubtfulHeight, Extremes, FoundNodata, is_number_in_steps, left_out};
+use crate::input::points::nodata::{Extremes, FoundNodata, is_number_in_steps, left_out};
 use crate::input::points::raw_bounds::RawBounds;
 use crate::input::points::record::PointRecord;
 use crate::input::points::record_sink::RecordSink;
@@ -14,6 +14,9 @@ use crate::input::text::row_choice::RowChoice;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
 use rust_decimal::prelude::ToPrimitive;
+
+/// A file of more records is not read only to look for heights that the user takes for nodata.
+const MOST_RECORDS: u64 = 1 << 24;
 
 impl Source {
     /// Keeps only the heights of a LAS or LAZ file that `choice` wants. The header claims no others then.
@@ -33,14 +36,27 @@ impl Source {
     pub(super) fn find_nodata(&mut self, choice: &RowChoice) -> Result<()> {
         let z = self.axes[2];
         self.nodata = choice.nodata.heights().iter().filter_map(|height| raw_of(&z, *height)).collect();
-        if choice.nodata.is_on() && self.claims_nodata() {
-            let FoundNodata { heights, others } = self.heights_of(choice)?.nodata(|value| is_number(&z, value));
+        let claims_nodata = choice.nodata.is_on() && self.claims_nodata();
+        if !claims_nodata && !self.may_have_named() {
+            return Ok(());
+        }
+        let SeenHeights { wanted, named } = self.see_heights(choice)?;
+        self.warnings.extend(named.next_to(&wanted, "point"));
+        if claims_nodata {
+            let FoundNodata { heights, others } = wanted.nodata(|value| is_number(&z, value));
             self.nodata.extend(heights.iter().filter_map(|height| raw_of(&z, height.value)));
             self.warnings.extend(heights.iter().map(|height| left_out(height, "point")));
             let [low, high] = others.unwrap_or_default();
             (self.min[2], self.max[2]) = (low, high);
         }
         Ok(())
+    }
+
+    /// Returns whether the file may have points of a height that the user takes for nodata, as far as its header claims, and is read to
+    /// look for them.
+    fn may_have_named(&self) -> bool {
+        let is_claimed = |raw: &i64| (self.min[2]..=self.max[2]).contains(&self.axes[2].value(*raw));
+        self.records <= MOST_RECORDS && self.nodata.iter().any(is_claimed)
     }
 
     /// Returns whether the lowest or the highest height that the header claims stands for nodata, or may.
@@ -56,30 +72,32 @@ impl Source {
     /// # Errors
     /// `Io` or `Input` if the file cannot be read.
     pub(crate) fn heights_of(&self, choice: &RowChoice) -> Result<Extremes> {
+        Ok(self.see_heights(choice)?.wanted)
+    }
+
+    fn see_heights(&self, choice: &RowChoice) -> Result<SeenHeights> {
         let axes = self.transform.as_ref().map_or(&self.axes, |transform| &transform.own.axes);
         let bounds = choice.bounds.map(|bounds| RawBounds::of(axes, bounds));
         let request = ChunkRequest { bounds: bounds.as_ref(), ..ChunkRequest::all() };
         let _ahead = self.read_ahead(bounds.as_ref(), false)?;
         let look = |chunk| {
             interrupt::check()?;
-            let extremes = Extremes::default();
+            let seen = SeenHeights::default();
             let mut heights =
-                Heights { choice, bounds: bounds.as_ref(), named: &self.nodata, kept: self.kept_heights, extremes };
+                Heights { choice, bounds: bounds.as_ref(), named: &self.nodata, kept: self.kept_heights, seen };
             self.read_chunk_of_file(chunk, request, &mut heights)?;
-            Ok(heights.extremes)
+            Ok(heights.seen)
         };
-        let add = |mut a: Extremes, b: Extremes| {
-            a.add(&b, 0);
-            a
-        };
-        let all = (0..self.chunks()).into_par_iter().map(look).try_reduce(Extremes::default, |a, b| Ok(add(a, b)))?;
-        Ok(all.map(|raw| axes[2].value(raw as i64)))
+        let chunks = (0..self.chunks()).into_par_iter();
+        let SeenHeights { wanted, named } = chunks.map(look).try_reduce(SeenHeights::default, |a, b| Ok(a.and(&b)))?;
+        let [wanted, named] = [wanted, named].map(|heights| heights.map(|raw| axes[2].value(raw as i64)));
+        Ok(SeenHeights { wanted, named })
     }
 
-    /// Returns a height of a text that may stand for nodata.
-    pub(crate) fn doubtful_height(&self) -> Option<&DoubtfulHeight> {
+    /// Returns the lowest and the highest heights of a text, without those that stand for nodata.
+    pub(crate) fn heights_of_text(&self) -> Option<&Extremes> {
         match &self.points {
-            PointData::Text(table) => table.doubtful_height(),
+            PointData::Text(table) => Some(table.heights_of_lines()),
             _ => None,
         }
     }
@@ -104,7 +122,24 @@ struct Heights<'a> {
     named: &'a [i64],
     /// Those that the job keeps.
     kept: Option<RawHeights>,
-    extremes: Extremes,
+    seen: SeenHeights,
+}
+
+/// The lowest and the highest heights of records.
+#[derive(Default)]
+struct SeenHeights {
+    /// Of those that the job wants.
+    wanted: Extremes,
+    /// Of those whose height the user takes for nodata.
+    named: Extremes,
+}
+
+impl SeenHeights {
+    fn and(mut self, other: &SeenHeights) -> SeenHeights {
+        self.wanted.add(&other.wanted, 0);
+        self.named.add(&other.named, 0);
+        self
+    }
 }
 
 impl RecordSink for Heights<'_> {
@@ -112,8 +147,10 @@ impl RecordSink for Heights<'_> {
         let is_within = self.bounds.is_none_or(|bounds| bounds.hold(&record.raw))
             && self.kept.is_none_or(|kept| kept.hold(record.raw[2]));
         let is_wanted = self.choice.classes[record.class as usize] && self.choice.returns.has(record.pulse_return);
-        if is_within && is_wanted && !record.withheld && !self.named.contains(&record.raw[2]) {
-            self.extremes.see(record.raw[2] as f64, number);
+        if is_within && is_wanted && !record.withheld {
+            let is_named = self.named.contains(&record.raw[2]);
+            let seen = if is_named { &mut self.seen.named } else { &mut self.seen.wanted };
+            seen.see(record.raw[2] as f64, number);
         }
         Ok(())
     }

@@ -15,6 +15,7 @@ use crate::input::text::delimiter::{CANDIDATES, Delimiter};
 use crate::input::text::header::{self, names_among_rows, separator_line};
 use crate::input::text::lines::is_skipped;
 use crate::input::text::names::{NamedColumns, named_columns, truncate};
+use crate::input::text::nodata_rows::NodataRows;
 use crate::input::text::number::Number;
 use crate::input::text::numbered::are_numbered;
 use crate::input::text::optional_columns::{drop_unreadable_colors, unreadable_class, unreadable_intensity};
@@ -53,7 +54,7 @@ const NUMBERED: &str = "has columns that no line names, and the first of them co
                         [\"x\", \"y\", \"z\"] if the first is x";
 
 /// How the lines of a text are to be read.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Columns {
     /// What separates the columns of a row.
     pub(crate) delimiter: Delimiter,
@@ -69,8 +70,8 @@ pub(crate) struct Columns {
     pub(crate) unit_colors: bool,
     /// Whether intensities are, likewise.
     pub(crate) unit_intensity: bool,
-    /// Whether numbers for nodata that are too large for any height are no reason to take a row for malformed.
-    pub(crate) huge_heights: bool,
+    /// The heights that stand for nodata. One that is too large for any height is no reason to take a row for malformed then.
+    pub(crate) nodata: NodataRows,
     /// Lines that begin with one of these are skipped.
     comments: Vec<String>,
 }
@@ -205,7 +206,7 @@ impl Columns {
         let strict_classes = choice.strict_classes;
         warnings.extend(unreadable_class(delimiter, &roles, data).filter(|_| !strict_classes));
         let (unit_colors, unit_intensity) = (false, false);
-        let huge_heights = choice.nodata.is_on();
+        let nodata = NodataRows::named(&choice.nodata);
         let columns = Columns {
             delimiter,
             roles,
@@ -214,7 +215,7 @@ impl Columns {
             strict_classes,
             unit_colors,
             unit_intensity,
-            huge_heights,
+            nodata,
             comments,
         };
         let (promised, degrees) = (header.count, found.is_some_and(|found| found.degrees));

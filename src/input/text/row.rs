@@ -2,7 +2,6 @@
 
 use crate::geometry::lattice::BEYOND;
 use crate::input::points::axis::AXIS_NAMES;
-use crate::input::points::nodata::is_nodata_number;
 use crate::input::points::record::{NODATA, PointRecord};
 use crate::input::points::returns::PulseReturn;
 use crate::input::text::columns::Columns;
@@ -200,9 +199,13 @@ impl<'a> RowReader<'a> {
     #[cold]
     fn nothing<'b>(&mut self, line: &'b [u8], role: ColumnRole) -> Option<(Number, Option<&'b [u8]>)> {
         let (field, rest) = self.columns.delimiter.split(line);
-        if role == ColumnRole::Coordinate(2) && self.columns.huge_heights && is_too_large(field) {
+        if role == ColumnRole::Coordinate(2) && is_too_large(field) {
             self.huge_height = std::str::from_utf8(field).ok()?.parse().ok()?;
-            return is_nodata_number(self.huge_height).then(|| (Number::too_large(self.huge_height < 0.0), rest));
+            return self
+                .columns
+                .nodata
+                .has(self.huge_height)
+                .then(|| (Number::too_large(self.huge_height < 0.0), rest));
         }
         let is_optional = match role {
             ColumnRole::Coordinate(_) => false,

@@ -35,6 +35,8 @@ pub(crate) struct Survey {
     pub(crate) heights: Extremes,
     /// Likewise, those that are too large for any height.
     pub(crate) huge_heights: Extremes,
+    /// Likewise, those that the user takes for nodata.
+    pub(crate) named_heights: Extremes,
     /// The number of rows whose heights stand for nodata.
     pub(crate) without_height: u64,
     /// The colours of all rows.
@@ -174,6 +176,7 @@ impl Survey {
             wanted: Findings::none(),
             heights: Extremes::default(),
             huge_heights: Extremes::default(),
+            named_heights: Extremes::default(),
             without_height: 0,
             colors: BrightnessScale::default(),
             intensities: BrightnessScale::default(),
@@ -234,7 +237,12 @@ impl Survey {
     fn see_nodata(&mut self, reader: &RowReader, wanted: Wanted, index: u64) {
         self.without_height += 1;
         let height = reader.height();
-        if height.abs() >= NO_HEIGHT && wanted.is_chosen(reader) {
+        if !wanted.is_chosen(reader) {
+            return;
+        }
+        if wanted.choice.nodata.heights().contains(&height) {
+            self.named_heights.see(height, index);
+        } else if height.abs() >= NO_HEIGHT {
             self.huge_heights.see(height, index);
         }
     }
@@ -243,6 +251,7 @@ impl Survey {
     pub(crate) fn add(&mut self, other: &Survey) {
         self.heights.add(&other.heights, self.lines);
         self.huge_heights.add(&other.huge_heights, self.lines);
+        self.named_heights.add(&other.named_heights, self.lines);
         self.without_height += other.without_height;
         self.lines += other.lines;
         self.rows += other.rows;

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::crs::unit::Unit;
 use crate::input::file::random_access::RandomAccessFile;
-use crate::input::points::axis::{AXIS_NAMES, Axis};
+use crate::input::points::axis::Axis;
 use crate::input::points::kept_heights::KeptHeights;
-use crate::input::points::nodata::{DoubtfulHeight, SharedHeight, left_out};
+use crate::input::points::nodata::{Extremes, SharedHeight, left_out};
 use crate::input::points::record_sink::RecordSink;
 use crate::input::points::returns::KeptReturns;
 use crate::input::text::columns::Columns;
@@ -71,10 +71,12 @@ pub(crate) struct TextTable {
     outliers: Outliers,
     /// The first chunk with outliers: the message about one of them says what to do.
     first_outlier_in: Option<usize>,
+    /// Where the other rows lie, and what to do about the outliers.
+    remedy: String,
     /// The heights that stand for nodata.
     nodata: NodataRows,
-    /// A height that may.
-    doubtful_height: Option<DoubtfulHeight>,
+    /// The lowest and the highest heights, without those that stand for nodata, and the numbers of their lines.
+    heights_of_lines: Extremes,
     /// The bounds that the job wants. They hold for the numbers in the text, before these are rounded to a lattice.
     bounds: Option<[f64; 4]>,
     /// The heights that the job wants, likewise.
@@ -141,7 +143,7 @@ impl TextTable {
             Ending::Whole => None,
         };
         rows.end = cut.as_ref().map_or(rows.end, |cut| cut.at);
-        let mut nodata = NodataRows::named(&choice.nodata);
+        let mut nodata = columns.nodata.clone();
         let mut surveys = survey(file, &columns, &rows, Wanted { choice, nodata: &nodata, within: None })?;
         let mut all = Survey::of_all(&surveys);
         let found = all.nodata(&choice.nodata);
@@ -151,8 +153,8 @@ impl TextTable {
         }
         let on_line = |height: &SharedHeight| SharedHeight { first: first.line + height.first, ..*height };
         warnings.extend(found.heights.iter().map(|height| left_out(&on_line(height), "line")));
-        let doubtful_height = all.heights.doubtful().filter(|_| choice.nodata.is_auto());
-        let doubtful_height = doubtful_height.map(|doubt| DoubtfulHeight { height: on_line(&doubt.height), ..doubt });
+        let heights_of_lines = all.heights.after(first.line);
+        warnings.extend(all.named_heights.after(first.line).next_to(&heights_of_lines, "line"));
         let chunks = starts_of_chunks(&surveys, first.line);
         let bounds = all.bounds();
         if all.rows > all.without_height && bounds.is_none() {
@@ -187,8 +189,9 @@ impl TextTable {
             without_outliers: None,
             outliers: Outliers::default(),
             first_outlier_in: None,
+            remedy: String::new(),
             nodata,
-            doubtful_height,
+            heights_of_lines,
             bounds: choice.bounds,
             heights: choice.heights,
         };
@@ -291,9 +294,19 @@ impl TextTable {
         Ok(farthest)
     }
 
-    /// Returns a height that may stand for nodata.
-    pub(crate) fn doubtful_height(&self) -> Option<&DoubtfulHeight> {
-        self.doubtful_height.as_ref().filter(|_| self.outliers() == 0)
+    /// Returns the lowest and the highest heights, without those that stand for nodata.
+    pub(crate) fn heights_of_lines(&self) -> &Extremes {
+        &self.heights_of_lines
+    }
+
+    /// Takes over where the other rows lie, and what to do about the outliers.
+    pub(crate) fn set_remedy(&mut self, remedy: &str) {
+        self.remedy = remedy.into();
+    }
+
+    /// Returns the box of the rows that the job wants, outliers included.
+    pub(crate) fn box_with_outliers(&self) -> Option<[[f64; 3]; 2]> {
+        self.wanted.bounds.map(|bounds| [bounds.min, bounds.max])
     }
 
     /// Returns the number of rows that the job wants, apart from those that are left out.
@@ -392,7 +405,7 @@ impl TextTable {
                     }
                     (Ok(()), Some(within)) if !within.holds(&reader.numbers) => {
                         filter.push_outlier(reader.class(), reader.pulse_return(), || {
-                            let what = if explained { String::new() } else { far_from(within) };
+                            let what = if explained { "" } else { self.remedy.as_str() };
                             explained = true;
                             format!("line {}: {} lies far from all other rows{what}", number(), shown(line))
                         });
@@ -426,18 +439,6 @@ impl TextTable {
         let bytes = (end - start) as u128 * records.min(rows) as u128 / rows.max(1) as u128;
         if records < rows { start..start + bytes as u64 } else { start..end }
     }
-}
-
-/// Returns what to say about the first outlier.
-fn far_from(RowBox { min, max }: &RowBox) -> String {
-    let axis = |axis: usize| format!("{} from {} to {}", AXIS_NAMES[axis], min[axis], max[axis]);
-    format!(
-        " ({}, {}, {}), and no lattice holds both at full precision: leave such rows out with [input] bounds or \
-         max_malformed_fraction, or set resolution or resolution_z so coarse that they fit",
-        axis(0),
-        axis(1),
-        axis(2)
-    )
 }
 
 /// Fails if x and y are so small that they are not told apart by the decimals that are kept.

@@ -3,7 +3,7 @@
 use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
 use crate::input::{
-    Axis, DoubtfulHeight, Extremes, FileFormat, Source, is_nodata_beside, is_number_in_steps, shown_height,
+    Axis, DoubtfulHeight, Extremes, FileFormat, Source, is_nodata_beside, is_number_in_steps, shown_height, who_has,
 };
 use crate::job::options::JobOptions;
 use crate::job::plan::extent::to_float;
@@ -11,57 +11,83 @@ use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::text_inputs::row_choice;
 use crate::{Error, Result};
 
-/// Fails if a file has a height that may stand for nodata, or one that does and that its header does not claim. Where a sample of its points
-/// looks like it, all of them are read to decide.
+/// What is doubtful about the heights of a file.
+struct Doubt {
+    what: String,
+    /// Whether the user has to decide before the job runs.
+    stops: bool,
+}
+
+/// Fails if a file has a height that may stand for nodata, or one that does and that its header does not claim. Warns of a height that is less
+/// doubtful. Where a sample of the points of a file looks like it, all of them are read to decide. A unit of heights is so many `metres`.
 ///
 /// # Errors
 /// [`Error::NoTerrain`] names the first such file, [`Error::Io`] one that cannot be read. It is no bad file that a job may leave out: what the
 /// sample of all files has of one depends on the others, and so would the mesh.
-pub(crate) fn refuse_doubtful_heights(
+pub(crate) fn check_doubtful_heights(
     sources: &[Source],
     sample: &HeightSample,
     lattice: &Lattice,
     options: &JobOptions,
-) -> Result<()> {
-    for source in sources.iter().filter(|_| options.input.nodata.is_on()) {
-        let what = match source.format {
-            FileFormat::Text => source.doubtful_height().map(|doubt| of_doubt(doubt, "line")),
-            _ => match sample
-                .by_file
-                .get(&source.path)
-                .map(|file| file.extremes.map(|z| own_height(source, lattice, z as i64)))
-            {
-                Some(heights) if of_heights(source, &heights, lattice, options).is_some() => {
-                    of_heights(source, &source.heights_of(&row_choice(options))?, lattice, options)
+    metres: f64,
+) -> Result<Vec<String>> {
+    let mut warnings = Vec::new();
+    // Of a text with outliers the heights show nothing but these.
+    let is_told = |source: &&Source| source.format != FileFormat::Text || source.outliers() == 0;
+    for source in sources.iter().filter(|_| options.input.nodata.is_on()).filter(is_told) {
+        let of = |heights: &Extremes| doubt_about(source, heights, lattice, options, metres);
+        let doubt = match source.heights_of_text() {
+            Some(heights) => of(heights),
+            None => {
+                let known = sample.by_file.get(&source.path).map(|file| &file.extremes);
+                let known = known.map(|heights| heights.map(|z| own_height(source, lattice, z as i64)));
+                match known.and_then(|heights| of(&heights)) {
+                    Some(_) => of(&source.heights_of(&row_choice(options))?),
+                    None => None,
                 }
-                _ => None,
-            },
+            }
         };
-        if let Some(what) = what {
-            return Err(Error::NoTerrain(format!("{}: {what}", source.path.display())));
+        let Some(Doubt { what, stops }) = doubt else { continue };
+        let what = format!("{}: {what}", source.path.display());
+        if stops {
+            return Err(Error::NoTerrain(what));
         }
+        warnings.push(what);
     }
-    Ok(())
+    Ok(warnings)
 }
 
-/// Returns a sentence about the heights of a file that is not a text, if some of them stand for nodata or may.
-fn of_heights(source: &Source, heights: &Extremes, lattice: &Lattice, options: &JobOptions) -> Option<String> {
+/// Returns what is doubtful about the heights of a file: some of them stand for nodata, or may.
+fn doubt_about(
+    source: &Source,
+    heights: &Extremes,
+    lattice: &Lattice,
+    options: &JobOptions,
+    metres: f64,
+) -> Option<Doubt> {
+    let is_text = source.format == FileFormat::Text;
     let step = to_float(lattice.resolution_z) / source.factor_of_heights();
-    let found = heights.nodata(|value| is_number_in_steps(value, step));
-    if let Some(height) = found.heights.first() {
-        return Some(unannounced(source, height.value));
+    let found = (!is_text).then(|| heights.nodata(|value| is_number_in_steps(value, step)));
+    if let Some(height) = found.as_ref().and_then(|found| found.heights.first()) {
+        return Some(Doubt { what: unannounced(source, height.value), stops: true });
     }
     // Who names nodata has looked at the heights.
-    let doubt = heights.doubtful().filter(|_| options.input.nodata.is_auto());
-    doubt.map(|doubt| of_doubt(&doubt, "point"))
+    if !options.input.nodata.is_auto() {
+        return None;
+    }
+    let metres = metres * source.factor_of_heights();
+    let record = if is_text { "line" } else { "point" };
+    let error = || heights.doubtful(metres).map(|doubt| Doubt { what: of_doubt(&doubt, record), stops: true });
+    let warning = || heights.set_apart(metres).map(|doubt| Doubt { what: of_doubt(&doubt, record), stops: false });
+    error().or_else(warning)
 }
 
 fn of_doubt(DoubtfulHeight { height, others: [low, high] }: &DoubtfulHeight, record: &str) -> String {
     let value = shown_height(height.value);
     format!(
-        "{} {record}s have the height {value} (the first is {record} {}), and all others lie between {low} and {high}: {value} may stand for nodata. Leave such \
-         points out with [input] nodata = {value}, or keep them with nodata = \"none\"",
-        height.count, height.first
+        "{}, and all others lie between {low} and {high}: {value} may stand for nodata. Leave such points out with [input] nodata = {value}, or \
+         keep them with nodata = \"none\"",
+        who_has(height, record)
     )
 }
 
@@ -94,4 +120,15 @@ fn unannounced(source: &Source, height: f64) -> String {
 pub(crate) fn own_height(source: &Source, lattice: &Lattice, steps: i64) -> f64 {
     let axis = Axis { offset: lattice.offset[2], scale: lattice.resolution_z };
     axis.value(steps) / source.factor_of_heights()
+}
+
+/// Returns it rounded as far as a step of the lattice lets it be known.
+pub(crate) fn shown_own_height(source: &Source, lattice: &Lattice, steps: i64) -> f64 {
+    let factor = source.factor_of_heights();
+    let (step, height) = (to_float(lattice.resolution_z) / factor, own_height(source, lattice, steps));
+    if factor == 1.0 {
+        return height;
+    }
+    let power = 10f64.powi((-step.log10()).floor().clamp(0.0, 9.0) as i32);
+    (height * power).round() / power
 }

@@ -8,7 +8,7 @@ use crate::job::options::JobOptions;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::lattice_choice::{LatticeWish, fineness};
 use crate::job::plan::point_survey::PointSurvey;
-use crate::job::plan::rounded_box::rounded;
+use crate::job::plan::rounded_box::{rounded, rounded_heights};
 use crate::job::plan::text_inputs::row_choice;
 use crate::output::frame::Frame;
 use rust_decimal::Decimal;
@@ -138,15 +138,17 @@ fn coarsenings(sources: &[Source], wish: &LatticeWish, extent: &Extent) -> [u32;
     })
 }
 
-/// Has the message about the first outlier of every binary file say where the `rest` lies, and what to do.
+/// Has the message about the first outlier of every file tell where the `rest` lies, and what to do.
 fn explain(sources: &mut [Source], rest: &Extent) {
     let [x, y, z] = [0, 1, 2].map(|axis| rounded([rest.min[axis], rest.max[axis]]));
     for source in sources.iter_mut().filter(|source| source.outliers() > 0) {
-        let is_beside = source.measured().is_some_and(|found| is_beside(found.all, rest));
+        let all = source.box_with_outliers();
+        let is_beside = is_beside(all, rest) || all.is_none() && source.format == FileFormat::Text;
         let bounds = match is_beside {
             true => format!("[input] bounds = [{}, {}, {}, {}] or ", x[0], y[0], x[1], y[1]),
             false => {
-                let [low, high] = rounded([rest.min[2], rest.max[2]].map(|height| height / source.factor_of_heights()));
+                let heights = [rest.min[2], rest.max[2]].map(|height| height / source.factor_of_heights());
+                let [low, high] = rounded_heights(heights);
                 format!("[input] heights = [{low}, {high}] or ")
             }
         };

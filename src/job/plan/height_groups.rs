@@ -60,7 +60,8 @@ pub(crate) struct HeightGroup {
 }
 
 impl HeightGroup {
-    fn and(self, other: HeightGroup) -> HeightGroup {
+    /// Returns both together.
+    pub(crate) fn and(self, other: HeightGroup) -> HeightGroup {
         HeightGroup {
             count: self.count + other.count,
             low: self.low.min(other.low),

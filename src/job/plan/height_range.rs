@@ -126,6 +126,17 @@ impl HeightSample {
         HeightBins::of(&self.heights).groups()
     }
 
+    /// Returns the height that all points have; `None` if they have several, or there is no point.
+    pub(crate) fn only_height(&self) -> Option<i32> {
+        let (low, high) = (*self.heights.first()?, *self.heights.last()?);
+        (low == high).then_some(low)
+    }
+
+    /// Returns whether it has looked at all records.
+    pub(crate) fn saw_all(&self) -> bool {
+        self.seen >= self.records
+    }
+
     /// Returns the lattice box of the points; `None` without any.
     pub(crate) fn bounds(&self) -> Option<Bounds<3>> {
         let positions: Vec<Site> = self.points.iter().map(|(position, _)| *position).collect();
@@ -151,7 +162,7 @@ impl HeightSample {
     /// than `claimed`.
     pub(crate) fn range_within(&self, claimed: HeightRange) -> Option<HeightRange> {
         let count = self.heights.len();
-        let saw_all = self.seen >= self.records;
+        let saw_all = self.saw_all();
         if count == 0 || count < LEAST_POINTS && !saw_all {
             return None;
         }

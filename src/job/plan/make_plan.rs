@@ -13,9 +13,10 @@ use crate::job::plan::breaklines::line_files::LineFiles;
 use crate::job::plan::breaklines::{CloudOfPlan, PlannedBreaklines, SystemOfPoints};
 use crate::job::plan::budget::network_memory;
 use crate::job::plan::common_crs::{common_crs, horizontal_unit};
-use crate::job::plan::doubtful_heights::refuse_doubtful_heights;
+use crate::job::plan::doubtful_heights::check_doubtful_heights;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::far_points::{extent_without_outliers, farthest_file};
+use crate::job::plan::flat_points::flat_points;
 use crate::job::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of_geocentric};
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all};
@@ -185,7 +186,8 @@ fn try_plan(
     }
     check_malformed_sample(sources, &sample, &options.input)?;
     refuse_zero_points(sources, &extent, &sample, &lattice)?;
-    refuse_doubtful_heights(sources, &sample, &lattice, options)?;
+    warnings.extend(check_doubtful_heights(sources, &sample, &lattice, options, metres_z)?);
+    warnings.extend(flat_points(sources, &extent, &sample, &lattice));
     let heights = JobHeights {
         sources,
         rules: &rules,

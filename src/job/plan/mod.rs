@@ -12,6 +12,7 @@ pub(crate) mod doubtful_heights;
 pub mod extent;
 pub(crate) mod far_points;
 pub mod fingerprint;
+pub(crate) mod flat_points;
 pub(crate) mod geocentric_inputs;
 pub(crate) mod globe_system;
 mod height_groups;

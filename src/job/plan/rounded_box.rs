@@ -9,6 +9,12 @@ pub(crate) fn rounded([low, high]: [f64; 2]) -> [String; 2] {
     [(low / step).floor() * step, (high / step).ceil() * step].map(|end| format!("{end:.decimals$}"))
 }
 
+/// Returns the ends of a range for `[input] heights`, which takes no single height.
+pub(crate) fn rounded_heights([low, high]: [f64; 2]) -> [String; 2] {
+    let margin = if low < high { 0.0 } else { 1.0 };
+    rounded([low - margin, high + margin])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -23,5 +29,6 @@ mod tests {
         ] {
             assert_eq!(rounded(range), expected.map(String::from), "{range:?}");
         }
+        assert_eq!(rounded_heights([5.0, 5.0]), ["4.00", "6.00"].map(String::from));
     }
 }

@@ -3,17 +3,16 @@
 
 use crate::geometry::Bounds;
 use crate::geometry::lattice::Lattice;
-use crate::input::{FileFormat, OptionalFields, PointRules, Source};
+use crate::input::{FileFormat, KeptHeights, OptionalFields, PointRules, Source};
 use crate::job::options::JobOptions;
-use crate::job::plan::doubtful_heights::own_height;
+use crate::job::plan::doubtful_heights::{own_height, shown_own_height};
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::height_groups::{
     FLAT, HIGH, HeightBins, HeightGroup, HeightsApart, LOW, TerrainScale, heights_apart,
 };
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::job_plan::{Plan, decoded_records};
-use crate::job::plan::point_survey::box_around;
-use crate::job::plan::rounded_box::rounded;
+use crate::job::plan::rounded_box::rounded_heights;
 use crate::{Result, interrupt};
 use rayon::prelude::*;
 
@@ -35,33 +34,109 @@ pub(crate) struct JobHeights<'a> {
     pub(crate) metres: f64,
 }
 
+/// What is known of the heights of a file, in steps of the lattice.
+struct FileHeights {
+    /// Those that lie apart from all others.
+    found: Option<HeightsApart>,
+    /// How many points were looked at, if not all.
+    sampled: Option<usize>,
+    /// Where all others lie; `None` if there is none.
+    good: Option<[i64; 2]>,
+}
+
 impl JobHeights<'_> {
-    /// Returns warnings about the files with heights that lie apart from all others. Who sets `[input] heights` has looked at them.
+    /// Returns warnings about the files with heights that lie apart from all others. Who sets `[input] heights` has looked at them, but may
+    /// have left out whole files.
     ///
     /// # Errors
     /// Those of reading.
     pub(crate) fn warnings(&self) -> Result<Vec<String>> {
-        let (mut warnings, mut read) = (Vec::new(), 0);
-        if self.options.input.heights.is_some() {
-            return Ok(warnings);
+        if let Some(kept) = self.options.input.heights {
+            return Ok(self.file_left_out(kept).into_iter().collect());
         }
+        let flat = self.flat_files();
+        let (mut files, mut read) = (Vec::new(), 0);
         let all = self.sample.groups();
-        for (index, source) in self.sources.iter().enumerate() {
-            let records = decoded_records(source, &self.rules[index]);
-            let can_read = read + records <= MOST_RECORDS;
-            let known = self.sample.by_file.get(&source.path).map_or(&[][..], |file| &file.heights);
-            let claim = self.extent.boxes[index].map(|claim| self.claimed(claim)).filter(|_| can_read);
-            let Some(ends) = self.doubtful_ends(known, &all, claim) else { continue };
-            let (bins, sampled) = match can_read {
-                true => (self.read(index, ends)?, None),
-                false => (HeightBins::of(known), Some(known.len())),
-            };
-            read += if can_read { records } else { 0 };
-            let found = heights_apart(&bins.groups(), self.scale());
-            warnings.extend(found.map(|found| self.sentence(source, &found, sampled)));
+        for index in 0..self.sources.len() {
+            let file = self.look(index, &all, &mut read)?;
+            files.push(if flat.contains(&index) { FileHeights { good: None, ..file } } else { file });
         }
-        warnings.extend(self.flat_file());
-        Ok(warnings)
+        let kept = self.advice(&files);
+        let apart = files.iter().zip(self.sources).filter_map(|(file, source)| {
+            file.found.as_ref().map(|found| self.sentence(source, found, file.sampled, &kept))
+        });
+        Ok(apart.chain(self.flat_file(&flat, &kept)).collect())
+    }
+
+    /// Looks at the heights of a file. `all` are those of the sample; `read` is the number of records that have been read for that.
+    fn look(&self, index: usize, all: &[HeightGroup], read: &mut u64) -> Result<FileHeights> {
+        let source = &self.sources[index];
+        let records = decoded_records(source, &self.rules[index]);
+        let can_read = *read + records <= MOST_RECORDS;
+        let known = self.sample.by_file.get(&source.path).map_or(&[][..], |file| &file.heights);
+        let claim = self.extent.boxes[index].map(|claim| self.claimed(claim));
+        let Some(ends) = self.doubtful_ends(known, all, claim.filter(|_| can_read)) else {
+            let seen = known.iter().min().zip(known.iter().max()).map(|(low, high)| [*low, *high].map(i64::from));
+            let ends = claim.into_iter().chain(seen).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+            return Ok(FileHeights { found: None, sampled: None, good: ends });
+        };
+        let (bins, sampled) = match can_read {
+            true => (self.read(index, ends)?, None),
+            false => (HeightBins::of(known), Some(known.len())),
+        };
+        *read += if can_read { records } else { 0 };
+        let groups = bins.groups();
+        let found = heights_apart(&groups, self.scale());
+        let others = found.map(|found| found.others).or_else(|| groups.iter().copied().reduce(HeightGroup::and));
+        Ok(FileHeights { found, sampled, good: others.map(|group| [group.low, group.high]) })
+    }
+
+    /// Returns the `[input] heights` that keep all good heights of all files, as a user writes them, each file in its own unit.
+    fn advice(&self, files: &[FileHeights]) -> [String; 2] {
+        let own = |(file, source): (&FileHeights, &Source)| {
+            // What was rounded to the lattice may lie a step beyond.
+            let is_rounded = self.lattice.resolution_z > source.axes[2].scale;
+            let [low, high] = file.good?;
+            Some(
+                [low - i64::from(is_rounded), high + i64::from(is_rounded)]
+                    .map(|z| own_height(source, self.lattice, z)),
+            )
+        };
+        let ranges = files.iter().zip(self.sources).filter_map(own);
+        rounded_heights(ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_default())
+    }
+
+    /// Returns what to say about the unit of `[input] heights` where files have several.
+    fn unit_of_each(&self) -> &'static str {
+        let mut factors = self.sources.iter().map(Source::factor_of_heights);
+        let first = factors.next();
+        if factors.all(|factor| Some(factor) == first) {
+            ""
+        } else {
+            ", in the unit of each file (such as feet and metres),"
+        }
+    }
+
+    /// Returns a warning about the first file of which no point of the sample is kept, though others are, as all lie outside of `kept`.
+    fn file_left_out(&self, KeptHeights([low, high]): KeptHeights) -> Option<String> {
+        let counts = |source: &&Source| self.sample.by_file.get(&source.path).map(|file| &file.counts);
+        let is_out = |source: &&Source| {
+            counts(source)
+                .is_some_and(|found| found.kept == 0 && found.out_of_bounds > 0 && found.out_of_bounds == found.read)
+        };
+        // Bounds leave out whole files as a rule.
+        let mut out = self.sources.iter().filter(|_| self.options.input.bounds.is_none()).filter(is_out);
+        let source = out.next().filter(|_| self.sample.counts.kept > 0)?;
+        let more = match out.count() {
+            0 => String::new(),
+            1 => " (and so it is for 1 other file)".into(),
+            count => format!(" (and so it is for {count} other files)"),
+        };
+        Some(format!(
+            "{}: no point of a sample lies within [input] heights = [{low}, {high}]{more}: heights holds for all files, in the unit of each; \
+             widen it, or leave the file out of [input] files",
+            source.path.display()
+        ))
     }
 
     fn scale(&self) -> TerrainScale {
@@ -106,8 +181,8 @@ impl JobHeights<'_> {
         (0..source.chunks()).into_par_iter().map(look).try_reduce(empty, |a, b| Ok(a.and(b)))
     }
 
-    fn sentence(&self, source: &Source, found: &HeightsApart, sampled: Option<usize>) -> String {
-        let value = |height: i64| own_height(source, self.lattice, height);
+    fn sentence(&self, source: &Source, found: &HeightsApart, sampled: Option<usize>, kept: &[String; 2]) -> String {
+        let value = |height: i64| shown_own_height(source, self.lattice, height);
         let range = |group: &HeightGroup| range_text([group.low, group.high].map(value));
         let record = if source.format == FileFormat::Text { "row" } else { "point" };
         let apart = |group: &HeightGroup| {
@@ -122,43 +197,64 @@ impl JobHeights<'_> {
         };
         let parts: Vec<String> = found.below.iter().chain(&found.above).map(apart).collect();
         let of = sampled.map_or(String::new(), |count| format!("of a sample of {count} points, "));
-        let others = found.others;
-        let [low, high] = rounded([others.low, others.high].map(value));
+        let others = match [found.others.low, found.others.high].map(value) {
+            [low, high] if low == high => format!("have the height {low}"),
+            [low, high] => format!("lie between {low} and {high}"),
+        };
         format!(
-            "{}: {of}{}, far from all others, which lie between {} and {}: they may be mistakes, or stand for nodata; [input] heights = \
-             [{low}, {high}] leaves them out",
+            "{}: {of}{}, far from all others, which {others}: they may be mistakes, or stand for nodata; {}",
             source.path.display(),
             parts.join(", and "),
-            value(others.low),
-            value(others.high)
+            self.remedy(source, found, kept)
         )
     }
 
-    /// Returns a warning about the first file that claims one height, far below those of all files around it or far above.
-    fn flat_file(&self) -> Option<String> {
-        let claims =
-            self.sources.iter().zip(&self.extent.boxes).filter_map(|(source, claim)| Some((source, (*claim)?)));
-        let is_flat = |[min, max]: SourceBox| (max[2] - min[2]) * self.metres <= FLAT;
-        let (flat, others): (Vec<_>, Vec<_>) = claims.partition(|(_, claim)| is_flat(*claim));
-        let is_apart = |claim: SourceBox| {
-            let mut around =
-                others.iter().map(|(_, other)| *other).filter(|other| are_neighbours(claim, *other)).peekable();
-            around.peek().is_some() && around.all(|other| self.lies_apart(claim, other))
+    /// Returns what to do about heights that lie apart: `[input] heights` holds for all files.
+    fn remedy(&self, source: &Source, found: &HeightsApart, kept: &[String; 2]) -> String {
+        let [low, high] = kept;
+        let is_kept = |height: i64| {
+            let [least, greatest] = kept.each_ref().map(|end| end.parse().unwrap_or(f64::NAN));
+            (least..=greatest).contains(&own_height(source, self.lattice, height))
         };
-        let mut found = flat.into_iter().filter(|(_, claim)| is_apart(*claim));
-        let (source, claim) = found.next()?;
-        let more = match found.count() {
+        let is_beside = !found.below.is_some_and(|group| is_kept(group.high))
+            && !found.above.is_some_and(|group| is_kept(group.low));
+        let unit = self.unit_of_each();
+        match is_beside {
+            true => format!("[input] heights = [{low}, {high}]{unit} leaves them out"),
+            false => format!(
+                "remove them from the file: [input] heights holds for all files, whose heights lie between {low} and {high}{unit} \
+                 and leaves out none of them"
+            ),
+        }
+    }
+
+    /// Returns the numbers of the files that claim one height, far below those of all files around them or far above.
+    fn flat_files(&self) -> Vec<usize> {
+        let is_flat = |[min, max]: &SourceBox| (max[2] - min[2]) * self.metres <= FLAT;
+        let claims = self.extent.boxes.iter().enumerate().filter_map(|(index, claim)| Some((index, (*claim)?)));
+        let (flat, others): (Vec<_>, Vec<_>) = claims.partition(|(_, claim)| is_flat(claim));
+        let is_apart = |claim: SourceBox| {
+            let around = || others.iter().map(|(_, other)| *other).filter(|other| are_neighbours(claim, *other));
+            around().next().is_some() && around().all(|other| self.lies_apart(claim, other))
+        };
+        flat.into_iter().filter(|(_, claim)| is_apart(*claim)).map(|(index, _)| index).collect()
+    }
+
+    /// Returns a warning about the first of the files `flat`.
+    fn flat_file(&self, flat: &[usize], [low, high]: &[String; 2]) -> Option<String> {
+        let (first, rest) = flat.split_first()?;
+        let (source, claim) = (&self.sources[*first], self.extent.boxes[*first]?);
+        let more = match rest.len() {
             0 => String::new(),
             count => format!(" (and so do {count} other files)"),
         };
-        let own = |height: f64| height / source.factor_of_heights();
-        let [min, max] = box_around(others.iter().flat_map(|(_, other)| *other))?;
-        let [low, high] = rounded([own(min[2]), own(max[2])]);
+        let own = |end: usize| claim[end][2] / source.factor_of_heights();
         Some(format!(
             "{}: all points have {}, far from those of the files around it{more}: they may be mistakes, or stand for nodata; \
-             leave them out with [input] heights = [{low}, {high}], or the file out of [input] files",
+             leave them out with [input] heights = [{low}, {high}]{}, or the file out of [input] files",
             source.path.display(),
-            range_text([own(claim[0][2]), own(claim[1][2])])
+            range_text([own(0), own(1)]),
+            self.unit_of_each().trim_end_matches(',')
         ))
     }
 
@@ -200,7 +296,13 @@ pub(crate) fn unforeseen_heights(source: &Source, read: Option<Bounds<3>>, plan:
     let below = is_far(f64::from(known.low) - f64::from(min[2]), f64::from(min[2]) >= low - 1.0, LOW);
     let above = is_far(f64::from(max[2]) - f64::from(known.high), f64::from(max[2]) <= high + 1.0, HIGH);
     let own = |height: i32| own_height(source, &plan.lattice, height.into());
-    let [lowest, highest] = rounded([own(known.low), own(known.high)]);
+    // The option holds for all files, each in its own unit.
+    let ends =
+        |height: i32| plan.inputs.iter().map(move |input| own_height(&input.source, &plan.lattice, height.into()));
+    let [lowest, highest] = rounded_heights([
+        ends(known.low).fold(own(known.low), f64::min),
+        ends(known.high).fold(own(known.high), f64::max),
+    ]);
     (below || above).then(|| {
         format!(
             "has heights from {} to {}, though nearly all points of a sample of all files lie between {lowest} and {highest}: some may be mistakes, or stand for \
