@@ -310,3 +310,82 @@ fn a_cure_brings_one_of_several_files_to_the_others() {
     let said = Job::on(&[&alone]).with("input", "crs = \"EPSG:32633\"").run();
     assert!((said.out + &said.err).contains("With x and y exchanged"), "{}", said.err);
 }
+
+#[test]
+fn exchanged_coordinates_that_lie_beside_the_zone_are_known_too() {
+    let folder = tempfile::tempdir().unwrap();
+    // Palermo and Bornholm in zone 32, as all of Italy and Denmark are.
+    for (name, place, crs) in
+        [("palermo.csv", [4_228_309.0, 882_459.0], 32632), ("bornholm.csv", [6_122_022.0, 876_443.0], 25832)]
+    {
+        let file = csv(&folder, name, place, 7.0);
+        let refused = Job::on(&[&file]).with("input", &format!("crs = \"EPSG:{crs}\"")).run();
+        refused.refused(3, &[name, "With x and y exchanged, they lie near it: say with columns"]);
+    }
+    let lecce = csv(&folder, "lecce.csv", [1_279_470.0, 4_507_360.0], 7.0);
+    let said = warnings(&Job::on(&[&lecce]).with("input", "crs = \"EPSG:32632\"").report());
+    assert!(
+        said.contains("there is nothing to do: [input] outside_crs_area stops") && !said.contains("foot"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_site_s_own_grid_under_a_map_is_named_however_near_its_area_is() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, place, crs) in [
+        ("site.csv", [10.0, 420.0], 32632),
+        ("total.csv", [5_000.0, 2_000.0], 32617),
+        ("centre.csv", [-9.0, -9.0], 3857),
+    ] {
+        let file = csv(&folder, name, place, 7.0);
+        let said = warnings(&Job::on(&[&file]).with("input", &format!("crs = \"EPSG:{crs}\"")).report());
+        assert!(
+            said.contains("as those of a site's own grid do: if they are one, set [input] crs = "),
+            "{name} {said}"
+        );
+    }
+    // Uganda beside its zone, at the equator.
+    let right = csv(&folder, "right.csv", [140_000.0, 40_000.0], 7.0);
+    let said = warnings(&Job::on(&[&right]).with("input", "crs = \"EPSG:32636\"").report());
+    assert!(!said.contains("area of use"), "{said}");
+}
+
+#[test]
+fn metres_under_a_map_in_feet_are_named_some_kilometres_outside_its_area() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, place, crs, unit) in [
+        ("new_york.csv", [303_000.0, 62_000.0], 2263, Some("metre")),
+        ("albany.csv", [200_000.0, 230_000.0], 2260, Some("metre")),
+        // A survey across the border of its zone, and one of a map without a false origin.
+        ("new_jersey.csv", [890_000.0, 200_000.0], 2263, None),
+        ("shinshu.csv", [-159_807.0, -29_800.0], 6677, None),
+    ] {
+        let file = csv(&folder, name, place, 7.0);
+        let said = warnings(&Job::on(&[&file]).with("input", &format!("crs = \"EPSG:{crs}\"")).report());
+        match unit {
+            Some(unit) => assert!(said.contains(&format!("In the unit {unit}, they lie within it")), "{name} {said}"),
+            None => assert!(!said.contains("area of use"), "{name} {said}"),
+        }
+    }
+}
+
+#[test]
+fn a_text_whose_unit_contradicts_its_code_is_judged_by_the_area_of_the_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let utm = r#"PROJCS["ETRS89 / UTM zone 32N",GEOGCS["ETRS89",DATUM["European_Terrestrial_Reference_System_1989",
+        SPHEROID["GRS 1980",6378137,298.257222101]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],
+        PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",9],
+        PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",500000],PARAMETER["false_northing",0],
+        UNIT["metre",0.3048,AUTHORITY["EPSG","9001"]],AUTHORITY["EPSG","25832"]]"#;
+    let file = write(folder.path(), "feet.las", &[text(utm)]);
+    move_to(&file, [PLACE[0], PLACE[1], 0.0]);
+    let words = ["whose text and code differ in the unit of x and y (foot, metre)", "latitude 36.5 to 84"];
+    Job::on(&[&file]).run().refused(3, &words);
+    let job = Job::on(&[&file]).with("input", "outside_crs_area = \"warn\"");
+    let said = warnings(&job.report());
+    assert!(said.contains("metre with 0.3048 in place of its length in metres"), "{said}");
+    let place: serde_json::Value =
+        serde_json::from_slice(&fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
+    assert!(place["epsg"].is_null() && place["crs"].is_string(), "{place}");
+}

@@ -433,3 +433,39 @@ fn urns_and_urls_name_systems_as_codes_do() {
     assert_eq!(moved["crs"], "WGS 84 / UTM zone 15N");
     assert_eq!(moved["transformations"][0]["inputs"], 1);
 }
+
+#[test]
+fn northings_that_are_as_great_as_the_radius_of_the_earth_are_no_geocentric_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(folder.path(), "north.las", &[keys(&[[2048, 0, 1, 4978]])]);
+    move_to(&file, [560_000.0, 6_353_000.0, 20.0]);
+    // The points reach 200 m from there.
+    let mut bytes = fs::read(&file).unwrap();
+    [131, 139].into_iter().for_each(|at| bytes[at..at + 8].copy_from_slice(&0.1f64.to_le_bytes()));
+    fs::write(&file, bytes).unwrap();
+    let said = warnings(&Job::on(&[&file]).report());
+    assert!(said.contains("is geocentric, but its points would stand upright near the equator"), "{said}");
+}
+
+#[test]
+fn a_file_without_a_system_whose_coordinates_look_like_degrees_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, records) in [("bare.las", vec![]), ("false.las", vec![keys(&[[2048, 0, 1, 4978]])])] {
+        let file = write(folder.path(), name, &records);
+        let mut bytes = fs::read(&file).unwrap();
+        let write = |bytes: &mut [u8], at: usize, value: f64| bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
+        for (axis, (scale, place, half)) in
+            [(1e-7, 7.1, 0.01), (1e-7, 51.2, 0.01), (0.01, 300.0, 40.0)].into_iter().enumerate()
+        {
+            write(&mut bytes, 131 + 8 * axis, scale);
+            write(&mut bytes, 155 + 8 * axis, place);
+            write(&mut bytes, 179 + 16 * axis, place + half);
+            write(&mut bytes, 187 + 16 * axis, place - half);
+        }
+        fs::write(&file, bytes).unwrap();
+        let words = "look like longitude and latitude, and are taken as lengths";
+        let job = |line: &str| Job::on(&[&file]).with("input", line);
+        assert!(warnings(&job("").report()).contains(words), "{name}");
+        assert!(!warnings(&job("crs = \"none\"").report()).contains(words), "{name}");
+    }
+}

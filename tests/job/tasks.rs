@@ -375,6 +375,13 @@ fn an_input_that_is_edited_in_place_is_told() {
     task(&job, "publish", "1/1").succeeded();
     let warnings = report(&job)["warnings"].to_string();
     assert!(warnings.contains("large.csv: modified after the job was planned") && warnings.contains("--restart"));
+    // A copy that keeps an old time.
+    up_to(&job, "publish", 2);
+    let copy = fs::File::options().write(true).open(&file).unwrap();
+    copy.set_modified(SystemTime::UNIX_EPOCH + Duration::from_secs(1_700_000_000)).unwrap();
+    task(&job, "publish", "1/1").succeeded();
+    let warnings = report(&job)["warnings"].to_string();
+    assert!(warnings.contains("large.csv: the time of its last change is another one than when the job was planned"));
     up_to(&job, "join", 2);
     edit(200);
     local(&job, 2).succeeded();

@@ -127,6 +127,8 @@ fn the_unit_of_the_user_is_that_of_all_columns() {
     let (found, said) = metres(&[&feet], "unit = \"us-foot\"");
     assert_eq!(found, [US_FOOT, US_FOOT]);
     assert!(!said.contains("say otherwise") && !said.contains("heights are in another unit"), "{said}");
+    // Which foot it is asks whoever has not stated it.
+    assert!(!said.contains("say feet, but not which") && metres(&[&feet], "").1.contains("say feet, but not which"));
     let (found, said) = metres(&[&feet, &metre], "unit = \"metre\"");
     assert_eq!(found, [1.0, 1.0]);
     assert!(
@@ -229,4 +231,25 @@ fn a_unit_of_length_over_columns_of_degrees_must_be_stated_twice() {
     let (found, said) = metres(&[&path], "unit = \"metre\"\ncrs = \"none\"");
     assert_eq!(found, [1.0, 1.0]);
     assert!(said.contains("degrees.csv: degree for x and y"), "{said}");
+}
+
+#[test]
+fn the_unit_of_a_record_without_a_system_is_that_of_the_plane_unless_the_user_states_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let bare = write(folder.path(), "key.las", &[keys(&[[3076, 0, 1, 9003]])]);
+    assert_eq!(metres(&[&bare], "").0[0], US_FOOT);
+    let (found, said) = metres(&[&bare], "unit = \"metre\"");
+    assert_eq!(found[0], 1.0);
+    assert!(
+        said.contains(
+            "[input] unit takes coordinates to be in metre, though the records of 1 of 1 inputs say otherwise"
+        ) && said.contains("key.las: US survey foot"),
+        "{said}"
+    );
+    assert!(!metres(&[&bare], "unit = \"us-foot\"").1.contains("say otherwise"));
+    let geocentric =
+        write(folder.path(), "false.las", &[keys(&[[1024, 0, 1, 3], [2048, 0, 1, 4978], [2052, 0, 1, 9002]])]);
+    let (found, said) = metres(&[&geocentric], "");
+    assert_eq!(found[0], 0.3048);
+    assert!(said.contains("they are taken as a plane in the unit foot"), "{said}");
 }

@@ -10,6 +10,9 @@ use crate::input::crs::rectangle::Rectangle;
 use crate::input::crs::system::Crs;
 use std::ops::RangeInclusive;
 
+/// Degrees of longitude and latitude of a small area.
+const SMALL: f64 = 15.0;
+
 /// The area of use of a system: one or several rectangles of longitude and latitude in degrees.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AreaOfUse {
@@ -20,9 +23,10 @@ pub(crate) struct AreaOfUse {
 
 impl AreaOfUse {
     /// Returns the area of a system by its EPSG code. That of a system without one, or whose text contradicts it, is that of all codes with
-    /// the same datum and the same projection, or else what its projection is good for. Returns `None` if nothing is known of that.
+    /// the same datum and the same projection, or else what its projection is good for; a text that contradicts the unit of its code is wrong
+    /// about the unit rather than about the place. Returns `None` if nothing is known of that.
     pub(crate) fn of(crs: &Crs) -> Option<AreaOfUse> {
-        let code = crs.epsg.filter(|_| crs.difference_to_code().is_none());
+        let code = crs.undisputed_code().or_else(|| crs.epsg.filter(|_| crs.difference_to_unit_of_code().is_some()));
         let by_code = code.map(|code| rectangles(&[code])).filter(|found| !found.is_empty());
         if let Some(rectangles) = by_code {
             return Some(AreaOfUse { rectangles, is_estimated: false });
@@ -48,6 +52,13 @@ impl AreaOfUse {
         let [west, south, east, north] = [west, south, east, north].map(|degrees| (degrees * 10.0).round() / 10.0);
         let estimated = if self.is_estimated { "estimated from its projection: " } else { "" };
         format!("{estimated}longitude {west} to {east}, latitude {south} to {north}")
+    }
+
+    /// Returns whether the part that is nearest to a place is that of a small country or of a zone of one: most changes of its coordinates lead
+    /// out of it.
+    pub(crate) fn is_small(&self, place: [f64; 2]) -> bool {
+        let Rectangle { west, south, east, north } = self.nearest(place);
+        (east - west).rem_euclid(360.0) <= SMALL && north - south <= SMALL
     }
 
     fn nearest(&self, place: [f64; 2]) -> Rectangle {

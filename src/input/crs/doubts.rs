@@ -1,9 +1,14 @@
 //! What a well-known text says in a way that cannot be used. Nothing may silently take its place.
 
 use crate::input::crs::form::CrsForm;
+use crate::input::crs::from_wkt::{from_epsg, parse};
 use crate::input::crs::projection::Projection;
 use crate::input::crs::system::{Crs, CrsKind};
+use crate::input::crs::unit::same_length;
 use crate::input::crs::wkt::{GEOGRAPHIC, LOCAL, PROJECTED, VERTICAL, WktNode, find, length, units};
+
+/// The code of the metre.
+const METRE: u32 = 9001;
 
 impl Crs {
     /// Says what of the system's text is there, but cannot be used, and which parameter its projection lacks.
@@ -41,17 +46,35 @@ impl Crs {
         ))
     }
 
-    /// Says in what the parameters of the system's text differ from those of its code.
+    /// Says in what the unit and the parameters of the system's text differ from those of its code.
     pub(crate) fn difference_to_code(&self) -> Option<String> {
         let (own, known) = (CrsForm::of_text(self.wkt.as_deref()?)?, CrsForm::of_code(self.epsg?)?);
-        let differences = own.differences_in_parameters(&known);
+        let unit = self.difference_to_unit_of_code().into_iter();
+        let differences: Vec<String> = unit.chain(own.differences_in_parameters(&known)).collect();
         (!differences.is_empty()).then(|| differences.join(" and "))
+    }
+
+    /// Says in what the unit of x and y in the system's text differs from that of its code.
+    pub(crate) fn difference_to_unit_of_code(&self) -> Option<String> {
+        let (own, known) = (parse(self.wkt.as_deref()?)?.horizontal, from_epsg(self.epsg?)?.horizontal);
+        let (metres, of_code) = own.metres_per_unit().zip(known.metres_per_unit())?;
+        (!same_length(metres, of_code)).then(|| format!("the unit of x and y ({}, {})", own.name(), known.name()))
+    }
+
+    /// Returns the code of the system, if its text does not contradict it.
+    pub(crate) fn undisputed_code(&self) -> Option<u32> {
+        self.epsg.filter(|_| self.difference_to_code().is_none())
     }
 }
 
-/// Says what is wrong with the unit of a system; `None` if it is a length, or if there is none.
+/// Says what is wrong with the unit of a system; `None` if it is a length and fits its name and its code, or if there is none.
 fn bad_unit(system: &WktNode) -> Option<String> {
-    let unit = units(system).0.filter(|unit| length(unit).is_none())?;
+    let is_metre = |unit: &WktNode| {
+        let name = unit.text(0).map(str::to_lowercase).unwrap_or_default();
+        matches!(name.as_str(), "metre" | "meter" | "m") || unit.epsg() == Some(METRE)
+    };
+    let fits = |unit: &WktNode| length(unit).is_some_and(|metres| !is_metre(unit) || same_length(metres, 1.0));
+    let unit = units(system).0.filter(|unit| !fits(unit))?;
     let metres = unit.number(1).map_or("no number".into(), |metres| format!("{metres}"));
     Some(format!("{} with {metres} in place of its length in metres", unit.text(0).unwrap_or("unnamed")))
 }

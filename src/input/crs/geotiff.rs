@@ -14,6 +14,9 @@ const GEOGRAPHIC_TYPE: u16 = 2048;
 const PROJECTED_TYPE: u16 = 3072;
 const LINEAR_UNITS: u16 = 3076;
 const LINEAR_UNIT_SIZE: u16 = 3077;
+/// The unit of lengths of a geographic or a geocentric system.
+const GEOCENTRIC_UNITS: u16 = 2052;
+const GEOCENTRIC_UNIT_SIZE: u16 = 2053;
 const VERTICAL_TYPE: u16 = 4096;
 const VERTICAL_CITATION: u16 = 4097;
 const VERTICAL_UNITS: u16 = 4099;
@@ -22,8 +25,13 @@ const CITATIONS: [u16; 3] = [3073, 2049, 1026];
 
 /// Returns the metres of the unit of x and y, if a key gives it.
 fn linear_unit(keys: &GeoKeys) -> Option<f64> {
-    match keys.code(LINEAR_UNITS)? {
-        USER_DEFINED => keys.double(LINEAR_UNIT_SIZE).filter(|size| *size > 0.0),
+    unit_of(keys, LINEAR_UNITS, LINEAR_UNIT_SIZE)
+}
+
+/// Returns the metres of a unit that one key gives by its code, or else another one by its length.
+fn unit_of(keys: &GeoKeys, code: u16, size: u16) -> Option<f64> {
+    match keys.code(code)? {
+        USER_DEFINED => keys.double(size).filter(|size| *size > 0.0),
         code => metres(code),
     }
 }
@@ -116,7 +124,9 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
     let horizontal = match unit {
         _ if kind == CrsKind::Geographic => Unit::Degree,
         Some(metres) => Unit::from_metres(Some(metres)),
-        None if kind == CrsKind::Geocentric => Unit::Metre,
+        None if kind == CrsKind::Geocentric => {
+            Unit::from_metres(unit_of(keys, GEOCENTRIC_UNITS, GEOCENTRIC_UNIT_SIZE).or(Some(1.0)))
+        }
         None => known.horizontal,
     };
     let heights = VerticalSystem {

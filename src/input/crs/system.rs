@@ -169,8 +169,7 @@ impl Crs {
     /// the code nor the text gives one.
     pub fn proj4_definition(&self) -> Option<String> {
         // A code whose text says otherwise is not what the coordinates are in.
-        let epsg = self.epsg.filter(|_| self.difference_to_code().is_none());
-        proj4::definition(epsg, self.wkt.as_deref())
+        proj4::definition(self.undisputed_code(), self.wkt.as_deref())
     }
 
     /// Returns the name of the vertical system, if the file gives one.

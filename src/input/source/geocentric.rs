@@ -2,7 +2,9 @@
 
 use crate::Result;
 use crate::geometry::lattice::AxisMap;
+use crate::input::crs::area_of_use::arc;
 use crate::input::crs::system::{Crs, CrsKind};
+use crate::input::crs::unit::Unit;
 use crate::input::points::axis::Axis;
 use crate::input::points::optional_fields::OptionalFields;
 use crate::input::points::returns::KeptReturns;
@@ -21,6 +23,12 @@ const EARTH: [f64; 2] = [6_378_137.0, 6_356_752.3];
 /// No terrain lies lower or higher above the ellipsoid, in metres: the bottom of the sea, and more than the highest mountain.
 const HEIGHTS: [f64; 2] = [-12_000.0, 20_000.0];
 
+/// No wall at the equator is so many units high.
+const UPRIGHT: f64 = 100.0;
+
+/// Longitudes and latitudes of a survey vary by less, and by so many times less than its heights.
+const DEGREES: [f64; 2] = [1.0, 10.0];
+
 /// No height of a terrain is greater, in metres.
 const NO_HEIGHT: f64 = 20_000.0;
 
@@ -36,17 +44,32 @@ impl Source {
         }
         let metres = self.crs.metres_per_unit().unwrap_or(1.0);
         let places = self.first_places()?;
-        let is_elsewhere = |place: &&[f64; 3]| !lies_near_surface(place.map(|value| value * metres));
+        // The key of the unit may be meant for the axes of the ellipsoid.
+        let is_elsewhere =
+            |place: &&[f64; 3]| [metres, 1.0].iter().all(|unit| !lies_near_surface(place.map(|value| value * unit)));
         let elsewhere = places.iter().filter(is_elsewhere).count();
         // A stray point or two may lie anywhere.
         let first = places.iter().find(is_elsewhere).filter(|_| elsewhere.saturating_mul(2) > places.len());
-        let Some([x, y, z]) = first else { return Ok(()) };
+        let why = match first {
+            Some([x, y, z]) => format!(
+                "its points do not lie on the surface of the earth, about 6,370 km from the middle: the first is at x {x:.0}, y {y:.0}, z \
+                 {z:.0}, {:.0} km from it",
+                arc([arc([*x, *y]), *z]) * metres / 1000.0,
+            ),
+            None => match upright(&places) {
+                Some([across, z]) => format!(
+                    "its points would stand upright near the equator, {:.0} m high and {:.0} m wide: x and y are those of a map",
+                    across * metres,
+                    z * metres
+                ),
+                None => return Ok(()),
+            },
+        };
         self.warnings.push(format!(
-            "its coordinate system ({}) is geocentric, but its points do not lie on the surface of the earth, about 6,370 km from the \
-             middle: the first is at x {x:.0}, y {y:.0}, z {z:.0}, {:.0} km from it. The record is ignored: unless [input] crs, missing_crs \
-             or another file states what the points are in, they are taken as a plane",
+            "its coordinate system ({}) is geocentric, but {why}. The record is ignored: unless [input] crs, missing_crs or another file \
+             states what the points are in, they are taken as a plane in the unit {} (set [input] unit to state another)",
             self.crs.label(),
-            libm::hypot(libm::hypot(*x, *y), *z) * metres / 1000.0
+            Unit::from_metres(Some(metres)).name()
         ));
         self.crs = Crs { horizontal: self.crs.horizontal, ..Crs::default() };
         Ok(())
@@ -61,6 +84,15 @@ impl Source {
     /// Returns whether the box that the file claims, if it claims one, may hold geocentric coordinates in metres.
     pub(crate) fn may_be_geocentric(&self) -> bool {
         self.claimed_middle().is_none_or(lies_near_surface)
+    }
+
+    /// Returns whether the box that the file claims looks like longitudes and latitudes beside heights in a unit of length.
+    pub(crate) fn looks_like_degrees(&self) -> bool {
+        let Some([x, y, _]) = self.claimed_middle() else { return false };
+        let [width, depth, height] = [0, 1, 2].map(|axis| self.max[axis] - self.min[axis]);
+        let across = width.max(depth);
+        let [most, times] = DEGREES;
+        x.abs() <= 180.0 && y.abs() <= 90.0 && across <= most && height > times * across
     }
 
     /// Returns the middle of the box that the file claims, in its own coordinates.
@@ -99,6 +131,19 @@ impl Source {
     fn coarse_place(&self, steps: [i32; 3]) -> [f64; 3] {
         [0, 1, 2].map(|axis| self.axes[axis].value(i64::from(steps[axis]) * COARSE))
     }
+}
+
+/// Returns how high the points rise from the middle of the earth and how far they reach to the north, if they would stand upright near
+/// the equator. Northings of some latitudes are as great as the radius of the earth, but vary as no heights do.
+fn upright(places: &[[f64; 3]]) -> Option<[f64; 2]> {
+    let range = |values: &dyn Fn(&[f64; 3]) -> f64| {
+        let all = places.iter().map(values);
+        let [least, greatest] = [all.clone().fold(f64::INFINITY, f64::min), all.fold(f64::NEG_INFINITY, f64::max)];
+        greatest - least
+    };
+    let (high, wide) = (range(&|[x, y, z]| arc([arc([*x, *y]), *z])), range(&|place| place[2]));
+    let is_near_equator = places.iter().all(|place| place[2].abs() < NO_HEIGHT);
+    (is_near_equator && high > UPRIGHT && high > 2.0 * wide).then_some([high, wide])
 }
 
 /// Returns whether a place in metres from the middle of the earth may be one of a terrain.

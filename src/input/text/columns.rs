@@ -202,7 +202,8 @@ impl Columns {
         let columns_of_last = texts.last().map_or(0, filled);
         let units = found.as_ref().map_or(Ok(UnitsOfAxes::default()), NamedColumns::units);
         let units = units.map_err(|what| bad(format!("its header {what}")))?;
-        warnings.extend(doubts.or_else(|| names_warning(found.as_ref(), &units, columns_of_last)));
+        let is_foot_unclear = units.some_foot && !choice.is_foot_stated;
+        warnings.extend(doubts.or_else(|| names_warning(found.as_ref(), is_foot_unclear, columns_of_last)));
         warnings.extend(unknown_units(found.as_ref()));
         let named = found.as_ref().filter(|_| options.columns.is_none()).map(|found| found.count);
         warnings.extend(drop_unreadable_colors(delimiter, &mut roles, data));
@@ -274,12 +275,12 @@ fn unknown_units(found: Option<&NamedColumns>) -> Option<String> {
     ))
 }
 
-fn names_warning(found: Option<&NamedColumns>, units: &UnitsOfAxes, columns: usize) -> Option<String> {
+fn names_warning(found: Option<&NamedColumns>, is_foot_unclear: bool, columns: usize) -> Option<String> {
     let warning = match found {
         None if columns > 3 => {
             "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns` under [input.csv]"
         }
-        Some(_) if units.some_foot => {
+        Some(_) if is_foot_unclear => {
             "the names of the columns say feet, but not which: they count as international feet (0.3048 m); if they are US survey feet, \
              set [input] unit = \"us-foot\""
         }

@@ -43,6 +43,8 @@ pub struct RowChoice {
     pub is_transformed: bool,
     /// Whether the job says the unit of the coordinates.
     pub has_unit: bool,
+    /// Whether the user states which foot the coordinates are in.
+    pub is_foot_stated: bool,
     /// Only rows of these classes.
     pub classes: [bool; 256],
     /// Whether the user has said which classes. If not, a class that cannot be read counts as 0.
@@ -66,6 +68,7 @@ impl RowChoice {
             bounds: None,
             is_transformed: false,
             has_unit: false,
+            is_foot_stated: false,
             classes: [true; 256],
             strict_classes: false,
             returns: KeptReturns::All,

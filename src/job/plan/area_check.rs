@@ -28,6 +28,19 @@ const NEAR: f64 = 1e6;
 
 /// A wrong scale is told from others by where it brings a file: so many times the length of all others beside them, or nearer.
 const BESIDE: f64 = 2.0;
+/// Surveys across the border of a zone are common. Where another unit would fit a small area, so many degrees beyond it are enough for a
+/// warning.
+const OTHER_UNIT: f64 = 0.05;
+
+/// A system with a false origin has it so many metres away from where its coordinates are zero, and a site's own grid does not reach as far.
+const FALSE_ORIGIN: f64 = 100_000.0;
+
+/// Where a system without a false origin has its origin at longitude and latitude zero, there is nothing but sea within so many metres.
+const OPEN_SEA: f64 = 1_000.0;
+
+/// What to do about points that may be right.
+const NOTHING_TO_DO: &str = ". If the CRS and the coordinates are right, there is nothing to do: [input] outside_crs_area stops a job only \
+    for points more than 670 km outside, or exchanged ones";
 
 /// Kilometres of a degree of arc.
 const DEGREE: f64 = 111.2;
@@ -77,7 +90,8 @@ pub(crate) fn check_places(
             1 => String::new(),
             all => format!("{} of {all} inputs, such as ", outside.len()),
         };
-        warnings.push(format!("{count}{}: {}", source.path.display(), first.sentence(source)));
+        let nothing = if first.is_hopeless() || first.is_local { "" } else { NOTHING_TO_DO };
+        warnings.push(format!("{count}{}: {}{nothing}", source.path.display(), first.sentence(source)));
     }
     Ok(())
 }
@@ -252,6 +266,8 @@ struct Outside {
     beyond: [f64; 2],
     /// What would bring them into the area.
     change: Option<Change>,
+    /// Whether they lie near the origin of the coordinates, where a site's own grid lies, and no survey is likely.
+    is_local: bool,
     is_target: bool,
     label: String,
     area: String,
@@ -265,31 +281,52 @@ impl Outside {
         places: &[[f64; 2]],
         others: Option<&Others>,
     ) -> Option<Outside> {
-        let beyond = |place: &[f64; 2]| way.apply(*place).map_or([f64::INFINITY; 2], |degrees| area.beyond(degrees));
-        let place = *places.iter().min_by(|a, b| arc(beyond(a)).total_cmp(&arc(beyond(b))))?;
-        let (degrees, beyond) = (way.apply(place), beyond(&place));
+        let beyond_area =
+            |place: &[f64; 2]| way.apply(*place).map_or([f64::INFINITY; 2], |degrees| area.beyond(degrees));
+        let place = *places.iter().min_by(|a, b| arc(beyond_area(a)).total_cmp(&arc(beyond_area(b))))?;
+        let (degrees, beyond) = (way.apply(place), beyond_area(&place));
         let is_within = |degrees: [f64; 2]| area.beyond(degrees) == [0.0; 2];
         let fits = |place: [f64; 2]| way.apply(place).is_some_and(is_within);
-        let is_near = arc(beyond) <= DOUBTFUL;
-        if is_near && (said.is_target || arc(beyond) <= EXCHANGED || !fits([place[1], place[0]])) {
+        let (is_far, is_near) = (arc(beyond) > HOPELESS, arc(beyond) <= DOUBTFUL);
+        let is_local = !is_far && !said.is_target && is_at_origin(&said.crs, place, degrees, beyond);
+        if is_near && !is_local && (said.is_target || arc(beyond) <= OTHER_UNIT) {
             return None;
         }
         let in_file = said.in_file(place);
+        let is_beside = |[across, along]: [f64; 2]| across.abs() <= HOPELESS && along == 0.0;
         let helps = |change: &Change| {
             let changed = change.apply(in_file?, &said.of_file)?;
-            if change.is_in_degrees() {
-                return Some(is_within(changed));
-            }
+            let there = said.of_place_in_file(changed);
+            let is_there = match change {
+                Change::ExchangedNearBy => there.is_some_and(|place| is_beside(beyond_area(&place))),
+                Change::Exchanged if is_near && arc(beyond) <= EXCHANGED => false,
+                _ => change.is_in_degrees() && is_within(changed) || there.is_some_and(fits),
+            };
             let is_allowed = |others: &Others| said.in_job(changed).is_some_and(|place| others.allow(change, place));
-            Some(said.of_place_in_file(changed).is_some_and(fits) && others.is_none_or(is_allowed))
+            Some(is_there && (change.is_in_degrees() || others.is_none_or(is_allowed)))
         };
         let of_one = others.into_iter().flat_map(|_| scales());
         let all = of_one.chain(in_file.into_iter().flat_map(|place| changes(place, &said.of_file)));
-        let is_far = arc(beyond) > HOPELESS;
-        let mut likely = all.filter(|change| is_far || change.is_likely_near_by());
+        // Around an origin without a false one, every shorter unit leads from beside the area into it.
+        let is_rare = has_false_origin(&said.crs) && area.is_small(degrees.unwrap_or_default());
+        let is_likely = |change: &Change| match change {
+            _ if is_far => true,
+            Change::Unit(_) => is_rare,
+            Change::Scaled(_) => !is_near,
+            change => *change == Change::Exchanged && !is_local,
+        };
+        let mut likely = all.filter(is_likely);
         let change = likely.find(|change| helps(change) == Some(true));
-        let (label, area) = (said.crs.label(), area.label(degrees.unwrap_or_default()));
-        Some(Outside { place, degrees, beyond, change, is_target: said.is_target, label, area })
+        if is_near && !is_local && change.is_none() {
+            return None;
+        }
+        let is_local = is_local && change.is_none();
+        let contradiction = said.crs.difference_to_code();
+        let contradiction =
+            contradiction.map_or_else(String::new, |what| format!(", whose text and code differ in {what}"));
+        let label = format!("{}{contradiction}", said.crs.label());
+        let area = area.label(degrees.unwrap_or_default());
+        Some(Outside { place, degrees, beyond, change, is_local, is_target: said.is_target, label, area })
     }
 
     /// Returns whether a terrain there is wrong for certain.
@@ -304,6 +341,7 @@ impl Outside {
     fn sentence(&self, source: &Source) -> String {
         let [x, y] = self.place;
         let lie = match self.degrees {
+            Some(_) if self.beyond == [0.0; 2] => "lie in an open sea, at longitude and latitude zero".into(),
             Some([longitude, latitude]) => format!(
                 "lie at longitude {:.2} and latitude {latitude:.2}, about {:.0} km outside its area of use ({})",
                 turned(longitude),
@@ -322,6 +360,11 @@ impl Outside {
         }
         match &self.change {
             Some(change) => change.cure(source.format),
+            None if self.is_local => {
+                "They lie near the origin of its coordinates, as those of a site's own grid do: if they are one, set [input] crs = \"none\". If \
+                 the CRS and the coordinates are right, there is nothing to do"
+                    .into()
+            }
             None if self.is_target => {
                 "Name a CRS that is made for their place with [input] to_crs, such as to_crs = \"utm\"".into()
             }
@@ -337,4 +380,16 @@ impl Outside {
             }
         }
     }
+}
+
+/// Returns whether a place on a map lies where its coordinates are zero, and neither the area of the map nor land is there.
+fn is_at_origin(crs: &Crs, place: [f64; 2], degrees: Option<[f64; 2]>, beyond: [f64; 2]) -> bool {
+    let (Some(metres), CrsKind::Projected) = (crs.metres_per_unit(), crs.kind) else { return false };
+    let from_zero = arc(place) * metres;
+    let is_in_sea = degrees.is_some_and(|degrees| arc(degrees) * DEGREE * 1000.0 < 2.0 * OPEN_SEA);
+    from_zero < OPEN_SEA && is_in_sea || from_zero < FALSE_ORIGIN && has_false_origin(crs) && beyond != [0.0; 2]
+}
+
+fn has_false_origin(crs: &Crs) -> bool {
+    crs.form().and_then(|form| form.false_origin()).map_or(0.0, arc) > FALSE_ORIGIN
 }

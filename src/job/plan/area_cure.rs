@@ -20,6 +20,8 @@ pub(crate) enum Change {
     Exchanged,
     /// They are multiplied by this.
     Scaled(f64),
+    /// The same, and they lie near the area then, as surveys beyond it do.
+    ExchangedNearBy,
     /// They count in this unit.
     Unit(Unit),
     /// This is added to them.
@@ -45,19 +47,31 @@ pub(crate) fn changes([x, y]: [f64; 2], crs: &Crs) -> Vec<Change> {
     }
     let units = UNITS.map(Change::Unit);
     let moved = moves([x, y], crs, metres).into_iter().filter(|by| *by != [0.0; 2]).map(Change::Moved);
-    [Change::Exchanged].into_iter().chain(units).chain(moved).chain(signs).collect()
+    [Change::Exchanged].into_iter().chain(units).chain([Change::ExchangedNearBy]).chain(moved).chain(signs).collect()
 }
 
 /// Returns what the number of a zone or a false origin may be, if it is too much or missing.
 fn moves(place: [f64; 2], crs: &Crs, metres: f64) -> Vec<[f64; 2]> {
     let zones = |value: f64| (value / ZONE).trunc() * ZONE;
-    // Eastings of less than two million metres are rather those of a neighbouring zone.
-    let in_front = |value: f64| if value.abs() < 2.0 * ZONE { 0.0 } else { -zones(value) };
+    let form = crs.form();
+    let projection = form.as_ref().and_then(|form| form.projection());
+    let meridian = projection.map_or(0.0, |projection| projection.value("lon_0"));
+    let origin =
+        projection.map(|projection| projection.false_origin()).unwrap_or_default().map(|length| length / metres);
+    // Other eastings of some million metres have no number in front.
+    let is_number = |value: f64| numbers_of_zone(meridian).contains(&value);
+    let in_front = |value: f64| if is_number(zones(value) / ZONE) { -zones(value) } else { 0.0 };
     let (x, y) = (in_front(place[0]), -zones(place[1]));
-    let origin = crs.form().and_then(|form| form.false_origin()).unwrap_or_default().map(|length| length / metres);
+    // A false origin of both that begins with whole millions.
+    let of_both = if y == 0.0 { [x, y] } else { [-zones(place[0]), y] };
     let [east, north] = origin;
     let [zone_east, zone_north] = origin.map(zones);
-    vec![[x, 0.0], [0.0, north], [east, 0.0], [east, north], [zone_east, 0.0], [zone_east, zone_north], [x, y]]
+    vec![[x, 0.0], [0.0, north], [east, 0.0], [east, north], [zone_east, 0.0], [zone_east, zone_north], of_both]
+}
+
+/// Returns the numbers of a zone with this central meridian: of 6 degrees as UTM counts them and as from Greenwich, and of 3 degrees.
+fn numbers_of_zone(meridian: f64) -> [f64; 3] {
+    [(meridian + 183.0) / 6.0, (meridian + 3.0) / 6.0, meridian / 3.0]
 }
 
 impl Change {
@@ -66,7 +80,7 @@ impl Change {
         let signed = |value: f64, is_negated: bool| if is_negated { -value } else { value };
         Some(match self {
             Change::Degrees { exchanged: false } => [x, y],
-            Change::Degrees { exchanged: true } | Change::Exchanged => [y, x],
+            Change::Degrees { exchanged: true } | Change::Exchanged | Change::ExchangedNearBy => [y, x],
             Change::Scaled(factor) => [x * factor, y * factor],
             Change::Unit(unit) => {
                 let factor = unit.metres_per_unit()? / crs.metres_per_unit()?;
@@ -82,27 +96,13 @@ impl Change {
         matches!(self, Change::Degrees { .. })
     }
 
-    /// Returns whether points that lie near the area are more likely to need this than to be right.
-    pub(crate) fn is_likely_near_by(&self) -> bool {
-        matches!(self, Change::Exchanged | Change::Scaled(_) | Change::Unit(_))
-    }
-
     /// Says what to do about a file of this format.
     pub(crate) fn cure(&self, format: FileFormat) -> String {
         let is_text = format == FileFormat::Text;
         match self {
             Change::Degrees { exchanged } => degrees(*exchanged, is_text),
-            Change::Exchanged if is_text => {
-                "With x and y exchanged, they lie within it: say with columns under [input.csv] which column is which, such as \
-                 columns = [\"y\", \"x\", \"z\"]"
-                    .into()
-            }
-            Change::Exchanged => {
-                "With x and y exchanged, they lie within it: exchange them first, for example with `pdal translate in.laz out.laz \
-                 --writers.las.forward=scale --writers.las.offset_x=auto --writers.las.offset_y=auto transformation \
-                 --filters.transformation.matrix=\"0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1\"`"
-                    .into()
-            }
+            Change::Exchanged => format!("With x and y exchanged, they lie within it: {}", exchange(is_text)),
+            Change::ExchangedNearBy => format!("With x and y exchanged, they lie near it: {}", exchange(is_text)),
             Change::Scaled(factor) => format!(
                 "Multiplied by {factor}, they lie beside those of the other files: {}, or leave the file out of [input] files",
                 if is_text {
@@ -129,6 +129,15 @@ impl Change {
             ),
         }
     }
+}
+
+/// Says how x and y are exchanged.
+fn exchange(is_text: bool) -> &'static str {
+    if is_text {
+        return "say with columns under [input.csv] which column is which, such as columns = [\"y\", \"x\", \"z\"]";
+    }
+    "exchange them first, for example with `pdal translate in.laz out.laz --writers.las.forward=scale --writers.las.offset_x=auto \
+     --writers.las.offset_y=auto transformation --filters.transformation.matrix=\"0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1\"`"
 }
 
 /// Says what to do about longitudes and latitudes under a map.

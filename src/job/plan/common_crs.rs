@@ -1,7 +1,7 @@
 //! The CRS and the units that all inputs of a job have in common.
 
 use crate::input::options::UnitChoice;
-use crate::input::{ComparableCrs, Crs, CrsChoice, FileFormat, Source, Unit};
+use crate::input::{ComparableCrs, Crs, CrsChoice, FileFormat, Source, Unit, same_length};
 use crate::job::plan::distinct_crs::DistinctCrs;
 use crate::{Error, Result, Warnings};
 use std::borrow::Cow;
@@ -37,7 +37,7 @@ impl Said<'_> {
 /// # Errors
 /// [`Error::Config`] if two sources differ, or cannot be compared, and the user does not say which CRS to take.
 pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warnings: &mut Warnings) -> Result<Crs> {
-    warn_of_other_units(sources, unit.unit(), warnings);
+    warn_of_other_units(sources, choice, unit.unit(), warnings);
     let said: Vec<Said> = sources.iter().map(|source| Said::of(source, unit)).collect();
     let mut crs = match choice {
         CrsChoice::Auto => {
@@ -265,20 +265,23 @@ fn warn_of_depths(said: &[Said], crs: &Crs, warnings: &mut Warnings) {
     }
 }
 
-/// Warns about texts whose columns say another unit than the user.
-fn warn_of_other_units(sources: &[Source], chosen: Unit, warnings: &mut Warnings) {
+/// Warns about texts whose columns, and about files without a CRS whose records, state another unit than the user.
+fn warn_of_other_units(sources: &[Source], choice: &CrsChoice, chosen: Unit, warnings: &mut Warnings) {
     let is_other = |source: &&Source| {
         let own = source.crs.horizontal;
+        let is_text = source.format == FileFormat::Text;
         let lengths = own.metres_per_unit().zip(chosen.metres_per_unit());
-        source.format == FileFormat::Text
-            && lengths.is_some_and(|(own, chosen)| own != chosen)
-            && !are_feet(own, chosen)
+        // What a choice of no CRS leaves aside is named elsewhere.
+        (is_text || *choice != CrsChoice::None && !source.crs.is_named())
+            && lengths.is_some_and(|(own, chosen)| !same_length(own, chosen))
+            && !(is_text && are_feet(own, chosen))
     };
     let others: Vec<&Source> = sources.iter().filter(is_other).collect();
     if let Some(first) = others.first() {
         warnings.push(format!(
-            "[input] unit takes coordinates to be in {}, though the columns of {} of {} inputs say otherwise, such as {}: {}",
+            "[input] unit takes coordinates to be in {}, though the {} of {} of {} inputs say otherwise, such as {}: {}",
             chosen.name(),
+            if first.format == FileFormat::Text { "columns" } else { "records" },
             others.len(),
             sources.len(),
             first.path.display(),

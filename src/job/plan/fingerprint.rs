@@ -159,6 +159,12 @@ impl Fingerprint {
         (!paths.is_empty()).then(|| first_few(paths))
     }
 
+    /// Returns the paths of the inputs whose times are others than when a job was planned. All else about them must be as it was.
+    pub(crate) fn with_other_times(&self, planned: &Fingerprint) -> Option<String> {
+        let paths = [self.files.with_other_times(&planned.files), self.lines.with_other_times(&planned.lines)].concat();
+        (!paths.is_empty()).then(|| first_few(paths))
+    }
+
     /// Returns what has changed since a job was planned with the fingerprint `planned`, besides the times of files: machines may see
     /// different ones.
     pub(crate) fn since_planned(&self, planned: &Fingerprint) -> Option<String> {

@@ -1,7 +1,7 @@
 //! Coordinates that count from the middle of the earth: their z is no height, and there is no terrain of them before they are transformed.
 
 use crate::input::options::InputOptions;
-use crate::input::{Crs, CrsChoice, CrsKind, Source};
+use crate::input::{Crs, CrsChoice, CrsKind, FileFormat, Source};
 use crate::job::plan::common_crs::TRANSFORM;
 use crate::{Error, Result, Warnings};
 
@@ -77,6 +77,29 @@ pub(crate) fn warn_of_geocentric(sources: &[Source], options: &InputOptions, war
             first.min[0],
             first.min[1],
             first.min[2]
+        ));
+    }
+}
+
+/// Warns about sources without a CRS whose x and y look like longitude and latitude. Of texts, the reader of their columns does.
+pub(crate) fn warn_of_degrees(sources: &[Source], options: &InputOptions, warnings: &mut Warnings) {
+    if options.crs != CrsChoice::Auto || options.missing_crs.is_some() {
+        return;
+    }
+    let is_meant = |source: &&Source| {
+        source.format != FileFormat::Text && !source.own_crs().is_named() && source.looks_like_degrees()
+    };
+    let found: Vec<&Source> = sources.iter().filter(is_meant).collect();
+    if let Some(first) = found.first() {
+        warnings.push(format!(
+            "{}{}: its x and y, from {} to {} and from {} to {}, look like longitude and latitude, and are taken as lengths. If they are \
+             degrees, set [input] crs = \"EPSG:4326\" and to_crs = \"utm\"; if they are a plane, set crs = \"none\"",
+            if sources.len() == 1 { String::new() } else { format!("{} of {} inputs, such as ", found.len(), sources.len()) },
+            first.path.display(),
+            first.min[0],
+            first.max[0],
+            first.min[1],
+            first.max[1]
         ));
     }
 }

@@ -133,6 +133,13 @@ impl InputIdentities {
         modified.map(|(now, _)| now.path.display().to_string()).collect()
     }
 
+    /// Returns the paths of those files that have another time than when they were `planned`, with the same contents in the same order.
+    pub(crate) fn with_other_times(&self, planned: &InputIdentities) -> Vec<String> {
+        let pairs = self.0.iter().zip(&planned.0);
+        let others = pairs.filter(|(now, planned)| now.content.modified != planned.content.modified);
+        others.map(|(now, _)| now.path.display().to_string()).collect()
+    }
+
     /// Returns what the inputs are called by now. They must have the same contents in the same order as `earlier`.
     pub(crate) fn renamed_since(&self, earlier: &InputIdentities) -> RenamedInputs {
         let pairs = earlier.0.iter().zip(&self.0).map(|(old, new)| (old.path.clone(), new.path.clone()));

@@ -17,7 +17,7 @@ use crate::job::plan::doubtful_heights::check_doubtful_heights;
 use crate::job::plan::extent::{Extent, SourceBox, to_float};
 use crate::job::plan::far_points::{extent_without_outliers, farthest_file};
 use crate::job::plan::flat_points::flat_points;
-use crate::job::plan::geocentric_inputs::{refuse_geocentric, warn_of_geocentric};
+use crate::job::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of_geocentric};
 use crate::job::plan::height_range::HeightSample;
 use crate::job::plan::inputs::{check_missing_records, open_all};
 use crate::job::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
@@ -146,6 +146,7 @@ fn try_plan(
     let (unit, metres) = horizontal_unit(sources, unit_choice, choice, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
     warn_of_geocentric(sources, &options.input, &mut warnings);
+    warn_of_degrees(sources, &options.input, &mut warnings);
     warn_of_dropped_units(sources, &options.input, [metres, metres_z], &mut warnings);
     let wish = LatticeWish {
         metres: [metres, metres_z],

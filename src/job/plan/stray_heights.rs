@@ -181,7 +181,13 @@ impl JobHeights<'_> {
         (0..source.chunks()).into_par_iter().map(look).try_reduce(empty, |a, b| Ok(a.and(b)))
     }
 
-    fn sentence(&self, source: &Source, found: &HeightsApart, sampled: Option<usize>, kept: &[String; 2]) -> Result<String> {
+    fn sentence(
+        &self,
+        source: &Source,
+        found: &HeightsApart,
+        sampled: Option<usize>,
+        kept: &[String; 2],
+    ) -> Result<String> {
         let value = |height: i64| shown_own_height(source, self.lattice, height);
         let range = |group: &HeightGroup| range_text([group.low, group.high].map(value));
         let apart = |group: &HeightGroup| {

@@ -166,7 +166,8 @@ pub(crate) fn publish(
         warnings.extend(raster.warnings);
         raster.stats
     });
-    let georeference = Georeference::new(&look.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.epsg);
+    let georeference =
+        Georeference::new(&look.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.undisputed_code());
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);
     let page_of_others = output.page && run.directory.has_page_of_others()?;

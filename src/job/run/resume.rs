@@ -91,12 +91,20 @@ impl EarlierRun {
         if let Some(what) = now.since_planned(&planned.fingerprint) {
             return Err(Error::Config(format!("{what}: changed since the job was planned; {PLAN_AGAIN}")));
         }
-        let warning = now.modified_since(planned).map(|files| {
+        let modified = now.modified_since(planned).map(|files| {
             format!(
                 "{files}: modified after the job was planned; if the content has changed, the terrain may show the old one: submit the job \
                  with --restart"
             )
         });
+        let other_time = || {
+            let files = now.with_other_times(&planned.fingerprint)?;
+            Some(format!(
+                "{files}: the time of its last change is another one than when the job was planned; `gdt-batch verify OUT --input FILE` \
+                 proves whether its points have changed"
+            ))
+        };
+        let warning = modified.or_else(other_time);
         Ok((now.with_names_of(&planned.fingerprint), warning))
     }
 

@@ -19,7 +19,7 @@ pub(crate) fn system_of(plan: &Plan) -> RasterSystem {
         return system;
     }
     // A code whose text says otherwise is not what the coordinates are in.
-    let code = crs.epsg.filter(|_| crs.difference_to_code().is_none()).and_then(short);
+    let code = crs.undisputed_code().and_then(short);
     let metres = Some(extras.metres_per_unit);
     RasterSystem { code, text: crs.wkt.clone(), name: crs.name.clone(), metres, ..system }
 }
