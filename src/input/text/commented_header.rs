@@ -146,7 +146,7 @@ fn header_doubt(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> Opt
         return is_as_wide.then_some(Doubt::Possible);
     }
     let is_word = |field: &&[u8]| !Name::read(field).has_blanks();
-    let are_words = delimiter != Delimiter::Blank && fields.iter().all(|field| is_word(&field));
+    let are_words = delimiter != Delimiter::Blank && fields.iter().all(is_word);
     let fields: Vec<(bool, Vec<Token>)> = fields.iter().map(|field| (is_word(field), tokens(field))).collect();
     let count = |wanted: fn(bool, &[Token]) -> bool| fields.iter().filter(|(word, field)| wanted(*word, field)).count();
     if count(|_, field| gives_value(field)) > 0 {

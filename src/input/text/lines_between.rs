@@ -50,7 +50,7 @@ impl TextStart {
             let mut header = FirstHeader { named: named.cloned(), what, candidates: start.candidates.to_vec(), rows };
             if let Some(named) = named {
                 let is_same = |line: &&[u8]| header.read(line, &text.marks).is_some_and(|own| own.roles == named.roles);
-                let at = start.lines.iter().rposition(|line| is_same(&line));
+                let at = start.lines.iter().rposition(is_same);
                 let line = at.map(|at| format!("line {} ({})", at.saturating_add(1), shown(start.lines[at])));
                 header.what = line.unwrap_or("the start of the file".to_string());
             }

@@ -35,8 +35,8 @@ pub(crate) fn stated_count(line: &[u8], marks: &[String]) -> Option<StatedCount>
         .partition(|word| *word != "3d" && word.starts_with(|c: char| c.is_ascii_digit()));
     let [number] = numbers[..] else { return None };
     let is_count = |word: &&str| POINTS.contains(word) || *word == "point" && words.contains(&"count");
-    let are_known = words.iter().all(|word| is_count(&word) || BESIDE.contains(word));
-    let points = whole(number).filter(|_| are_known && words.iter().any(|word| is_count(&word)))?;
+    let are_known = words.iter().all(|word| is_count(word) || BESIDE.contains(word));
+    let points = whole(number).filter(|_| are_known && words.iter().any(is_count))?;
     Some(StatedCount { points, comment: shown(line) })
 }
 
