@@ -322,6 +322,18 @@ impl ResolutionChoice {
 }
 
 /// A user writes a number. A step that a program wrote down is text, so that no digit is lost.
+impl TryFrom<Vec<f64>> for KeptHeights {
+    type Error = InvalidValue;
+
+    fn try_from(numbers: Vec<f64>) -> Result<KeptHeights, InvalidValue> {
+        match <[f64; 2]>::try_from(numbers) {
+            Ok([low, high]) if low.is_finite() && high.is_finite() && low < high => Ok(KeptHeights([low, high])),
+            Ok(heights) => Err(InvalidValue::Heights(heights.to_vec())),
+            Err(numbers) => Err(InvalidValue::Heights(numbers)),
+        }
+    }
+}
+
 impl TryFrom<toml::Value> for ResolutionChoice {
     type Error = InvalidValue;
 
@@ -388,6 +400,13 @@ mod tests {
         ] {
             let options: InputOptions = toml::from_str(&format!("files = [\"a\"]\n{text}")).unwrap();
             assert_eq!(options.needs_numbers(), needed, "{text}");
+        }
+    }
+
+    #[test]
+    fn heights_are_a_lower_and_a_higher_one() {
+        for wrong in [vec![1.0], vec![2.0, 1.0], vec![1.0, 1.0], vec![0.0, f64::NAN], vec![0.0, 1.0, 2.0]] {
+            assert!(KeptHeights::try_from(wrong).is_err());
         }
     }
 

@@ -13,7 +13,7 @@ const PLENTY_MIB: u64 = 1_536;
 fn broken_files_are_refused_or_read_as_far_as_possible() {
     let Some(shared) = shared() else { return };
     for (name, code, words) in [
-        ("1.2-no-points.las", 3, &["1.2-no-points.las", "1065", "max_malformed_fraction"][..]),
+        ("1.2-no-points.las", 3, &["1.2-no-points.las", "1065", "on_bad_file"][..]),
         ("1.2-with-color-clipped.las", 3, &["1.2-with-color-clipped.las", "1065", "max_malformed_fraction"]),
         ("badheader.txt", 3, &["badheader.txt", "2 columns x", "columns"]),
         ("git-lfs-pointer.laz", 3, &["git-lfs-pointer.laz", "git lfs pull"]),

@@ -4,7 +4,6 @@ use rust_decimal::prelude::ToPrimitive;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::lattice::shortest_decimal;
-use crate::input::options::InvalidValue;
 use crate::input::points::axis::Axis;
 
 /// The lowest and the highest height of the points that a job reads, both included, in the unit of the files.
@@ -31,18 +30,6 @@ impl KeptHeights {
         RawHeights {
             min: steps(low).and_then(|steps| steps.ceil().to_i64()).unwrap_or(far(low)),
             max: steps(high).and_then(|steps| steps.floor().to_i64()).unwrap_or(far(high)),
-        }
-    }
-}
-
-impl TryFrom<Vec<f64>> for KeptHeights {
-    type Error = InvalidValue;
-
-    fn try_from(numbers: Vec<f64>) -> Result<KeptHeights, InvalidValue> {
-        match <[f64; 2]>::try_from(numbers) {
-            Ok([low, high]) if low.is_finite() && high.is_finite() && low < high => Ok(KeptHeights([low, high])),
-            Ok(heights) => Err(InvalidValue::Heights(heights.to_vec())),
-            Err(numbers) => Err(InvalidValue::Heights(numbers)),
         }
     }
 }
@@ -75,8 +62,5 @@ mod tests {
         let heights = KeptHeights([-1e300, 2.5]).raw(&axis);
         assert_eq!([i64::MIN, 200, 201].map(|raw| heights.hold(raw)), [true, true, false]);
         assert!(KeptHeights([-1.0, 2.0]).hold(2.0) && !KeptHeights([-1.0, 2.0]).hold(-1.01));
-        for wrong in [vec![1.0], vec![2.0, 1.0], vec![1.0, 1.0], vec![0.0, f64::NAN], vec![0.0, 1.0, 2.0]] {
-            assert!(KeptHeights::try_from(wrong).is_err());
-        }
     }
 }

@@ -4,7 +4,7 @@ use crate::breaklines::{Feature, FeatureKind, Vertex};
 use crate::input::is_number_in_steps;
 use crate::input::lines::LineFile;
 use crate::job::plan::breaklines::other_unit::UnitJudge;
-use crate::job::plan::breaklines::terrain::{Around, Pair, SampledTerrain};
+use crate::job::plan::breaklines::terrain::{Around, Pair, SampledTerrain, median, middles, rounded};
 use crate::job::plan::extent::to_float;
 use crate::{Result, interrupt};
 
@@ -267,24 +267,4 @@ fn spikes(path: &[Vertex], least: i64) -> impl Iterator<Item = &Vertex> {
     };
     let is_spike = move |(before, after): (i64, i64)| before.min(after) > least || before.max(after) < -least;
     (0..path.len()).filter(move |at| differences(*at).is_some_and(is_spike)).filter_map(|at| path.get(at))
-}
-
-/// Returns the middle height of lines and that of the points around, for messages.
-pub(super) fn middles(pairs: &[Pair]) -> Option<[f64; 2]> {
-    Some([
-        rounded(median(pairs.iter().map(|(z, _)| *z))?),
-        rounded(median(pairs.iter().map(|(_, around)| around.middle))?),
-    ])
-}
-
-/// Returns the middle one of `values`; of two, the greater.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
-}
-
-/// Rounds to hundredths: a sample tells no more.
-fn rounded(z: f64) -> f64 {
-    (z * 100.0).round() / 100.0
 }

@@ -2,8 +2,7 @@
 
 use crate::breaklines::Feature;
 use crate::input::Unit;
-use crate::job::plan::breaklines::height_doubts::{median, middles};
-use crate::job::plan::breaklines::terrain::{Around, Pair, SampledTerrain};
+use crate::job::plan::breaklines::terrain::{Around, Pair, SampledTerrain, median, middles};
 
 /// Heights of a file in another unit are so many times nearer to the terrain when they are converted, and were farther from it than so many
 /// metres, or fewer where they rise and fall with it.

@@ -144,6 +144,26 @@ impl<'a> SampledTerrain<'a> {
     }
 }
 
+/// Returns the middle height of lines and that of the points around, for messages.
+pub(super) fn middles(pairs: &[Pair]) -> Option<[f64; 2]> {
+    Some([
+        rounded(median(pairs.iter().map(|(z, _)| *z))?),
+        rounded(median(pairs.iter().map(|(_, around)| around.middle))?),
+    ])
+}
+
+/// Returns the middle one of `values`; of two, the greater.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// Rounds to hundredths: a sample tells no more.
+pub(super) fn rounded(z: f64) -> f64 {
+    (z * 100.0).round() / 100.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
