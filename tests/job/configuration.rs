@@ -45,7 +45,7 @@ fn the_shipped_configurations_run() {
 fn the_full_configuration_shows_every_option_with_its_default() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/full.toml");
     let mut full = gdt_batch::config::load(&path).unwrap();
-    (full.input.classes, full.input.bounds) = (None, None);
+    (full.input.classes, full.input.bounds, full.input.heights) = (None, None, None);
     // What they show is no default either.
     assert!(full.output.height_offset.take().is_some() && full.output.copyright.take().is_some());
     assert!(full.output.raster.take().is_some_and(|raster| raster.nodata == Default::default()));

@@ -211,7 +211,7 @@ fn what_to_do_about_outliers_is_said_once() {
     let said = text.job().run();
     assert_eq!(said.code, 3, "{}", said.err);
     assert_eq!(said.err.matches("far from all other rows").count(), 5, "{}", said.err);
-    assert_eq!(said.err.matches("[input] bounds or").count(), 1, "{}", said.err);
+    assert_eq!(said.err.matches("leave such rows out with [input] bounds").count(), 1, "{}", said.err);
 }
 
 #[test]

@@ -157,7 +157,7 @@ fn a_projected_system_over_degrees_is_a_warning() {
     let [far, near] = ["far.las", "near.las"].map(|name| write(folder.path(), name, &[code(25832)]));
     move_to_degrees(&far);
     // Its area of use does not reach to the equator.
-    Job::on(&[&far]).run().refused(3, &["far.las", "If they are longitude and latitude, [input] crs"]);
+    Job::on(&[&far]).run().refused(3, &["far.las", "As longitude and latitude, they lie within it: [input] crs"]);
     let said = Job::on(&[&far]).with("input", "outside_crs_area = \"warn\"").run_with(&["check"]);
     let said = format!("{}{}", said.out, said.err);
     assert!(said.contains("far.las") && said.contains("as longitudes and latitudes are"), "{said}");

@@ -312,7 +312,7 @@ impl Outside {
         let is_likely = |change: &Change| match change {
             _ if is_far => true,
             Change::Unit(_) => is_rare,
-            Change::Scaled(_) => !is_near,
+            Change::Scaled(_) => true,
             change => *change == Change::Exchanged && !is_local,
         };
         let mut likely = all.filter(is_likely);
