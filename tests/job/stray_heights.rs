@@ -82,6 +82,9 @@ fn is_silent(files: &[&PathBuf]) {
     assert!(!warnings.contains("[input] heights"), "{warnings}");
 }
 
+/// Returns the height of point number i in hundredths.
+type HeightAt<'a> = &'a dyn Fn(usize) -> i32;
+
 #[test]
 fn nodata_that_does_not_repeat_is_told_and_heights_leave_it_out() {
     let files = Files::new();
@@ -121,7 +124,7 @@ fn a_change_of_heights_starts_over_and_wrong_ones_are_refused() {
 #[test]
 fn spikes_pits_and_ramps_are_told() {
     let files = Files::new();
-    let cases: [(usize, &dyn Fn(usize) -> i32, &str); 6] = [
+    let cases: [(usize, HeightAt, &str); 6] = [
         (POINTS, &|_| 10_000_000, " has the height 100000"),
         (POINTS, &|_| -1_200_000, " has the height -12000"),
         (750, &|_| 0, "2 points have the height 0"),
