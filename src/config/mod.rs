@@ -81,17 +81,26 @@ const RENAMED: [Renamed; 7] = [
 /// # Errors
 /// [`Error::Config`] with the offending line if the text is not a valid configuration or the file cannot be read.
 pub fn load(path: &Path) -> Result<JobOptions> {
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             return Err(Error::Config(format!("there is no configuration file {}", path.display())));
         }
         Err(e) => return Err(Error::Config(format!("cannot read the configuration {}: {e}", path.display()))),
     };
     let refused = |what: String| Error::Config(format!("{}: {what}", path.display()));
+    let text = String::from_utf8(bytes).map_err(|error| refused(not_utf_8(&error)))?;
     let mut options = parse(&text).map_err(refused)?;
     resolve_paths(&mut options, path.parent().unwrap_or(Path::new(""))).map_err(refused)?;
     Ok(options)
+}
+
+fn not_utf_8(error: &std::string::FromUtf8Error) -> String {
+    let bytes = error.as_bytes();
+    let at = error.utf8_error().valid_up_to();
+    let line = 1 + bytes[..at].iter().filter(|byte| **byte == b'\n').count();
+    let byte = bytes.get(at).copied().unwrap_or_default();
+    format!("line {line} has the byte {byte:#04x}, which is not UTF-8 there: save the file in UTF-8")
 }
 
 /// As [`load`], for the text of a configuration in the directory `base`.

@@ -110,6 +110,8 @@ fn wrong_configurations_are_refused_with_the_line_number() {
 fn a_command_line_without_a_readable_configuration_is_refused() {
     let folder = folder_with_cloud();
     gdt_batch(folder.path(), &["no.toml"]).refused(2, &["no configuration file no.toml"]);
+    fs::write(folder.path().join("old.toml"), b"[input]\nfiles = [\"Stra\xdfe.laz\"]\n").unwrap();
+    gdt_batch(folder.path(), &["old.toml"]).refused(2, &["old.toml: line 2 has the byte 0xdf, which is not UTF-8"]);
     gdt_batch(folder.path(), &["."]).refused(2, &["cannot read the configuration"]);
     fs::write(folder.path().join("binary.toml"), [0xff, 0xfe, 0x00]).unwrap();
     gdt_batch(folder.path(), &["binary.toml"]).refused(2, &["binary.toml"]);
