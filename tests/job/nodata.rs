@@ -204,7 +204,12 @@ fn a_height_far_below_all_others_for_their_range_is_told() {
     for (low, range, mark, is_told) in [
         (85, 1001, "0", true),
         (60, 200, "0", true),
-        (60, 1000, "0", false),
+        (60, 1000, "0", true),
+        (30, 4500, "0", true),
+        (17, 3200, "255", true),
+        (17, 3200, "400", true),
+        (60, 4500, "32", false),
+        (17, 3200, "65", false),
         (3, 20, "0", false),
         (60, 200, "52", false),
     ] {

@@ -19,6 +19,24 @@ const LEAST_GAP: f64 = 5.0;
 /// and so many times as far as all others spread.
 const TIMES_RANGE: f64 = 8.0;
 
+/// A value of a small share of all records, one in so many, may stand for nodata nearer to the others,
+const SHARE: u64 = 10;
+
+/// if so many records have it.
+const LEAST_RECORDS: u64 = 5;
+
+/// It is a usual number for nodata at least so many metres from the nearest other height, since the shore of water lies closer to it, and so many
+/// times as far as all others spread,
+const USUAL_GAP: f64 = 10.0;
+const TIMES_OF_USUAL: f64 = 1.0 / 3.0;
+
+/// or any number so far above all others: a tower may stand out of them. Below, a quarry may lie.
+const TOWER: f64 = 150.0;
+const TIMES_OF_TOWER: f64 = 2.0;
+
+/// Numbers that some programs write for nodata, and that may be heights.
+const USUAL_NUMBERS: [f64; 7] = [0.0, -1.0, -99.0, 255.0, 999.0, 65535.0, 1e6];
+
 /// Heights within so many units of a value are next to it, unless their own range is smaller.
 const NEXT: f64 = 5.0;
 
@@ -59,6 +77,11 @@ pub(crate) fn is_nodata_number(value: f64) -> bool {
     ENDS_OF_INTEGERS.contains(&value) || is_nines() || is_great_power_of_ten(value.abs()) || is_end()
 }
 
+/// Returns whether some programs write `value` for nodata, though it may be a height.
+fn is_usual_number(value: f64) -> bool {
+    USUAL_NUMBERS.contains(&value) || is_nodata_number(value)
+}
+
 fn is_great_power_of_ten(value: f64) -> bool {
     let power = value.log10().round();
     value >= 0.999e9 && (value / 10_f64.powf(power) - 1.0).abs() < 1e-9
@@ -81,6 +104,15 @@ pub(crate) struct SharedHeight {
     pub(crate) count: u64,
     /// The number of the first of them, or of its line.
     pub(crate) first: u64,
+}
+
+impl SharedHeight {
+    /// Returns whether few of all `records` have this value, and it lies at least `least` below `others`, and so many `times` as far as these
+    /// lie from each other.
+    fn is_set_apart(&self, records: u64, [low, high]: [f64; 2], least: f64, times: f64) -> bool {
+        let is_small_share = self.count >= LEAST_RECORDS && self.count.saturating_mul(SHARE) < records;
+        is_small_share && low - self.value >= least.max(times * (high - low))
+    }
 }
 
 /// The lowest and the highest values of heights, and how many records have each.
@@ -132,6 +164,14 @@ pub(crate) struct DoubtfulHeight {
     pub(crate) height: SharedHeight,
     /// Where all other heights lie.
     pub(crate) others: [f64; 2],
+}
+
+impl DoubtfulHeight {
+    fn with_other_sign(self) -> DoubtfulHeight {
+        let [low, high] = self.others;
+        let height = SharedHeight { value: 0.0 - self.height.value, ..self.height };
+        DoubtfulHeight { height, others: [0.0 - high, 0.0 - low] }
+    }
 }
 
 /// Which heights stand for nodata.
@@ -221,26 +261,33 @@ impl Extremes {
         let [few_low, few_high] = FEW;
         let [least_low, least_high] = [DOUBTFUL_LOW, DOUBTFUL_HIGH].map(|least| least / metres);
         let low = self.lowest.doubtful(&self.highest, few_low, |height, above, others| {
-            is_apart_from(above, height, least_low) || is_far(height, others, least_low)
+            is_apart_from(above, height.value, least_low) || is_far(height.value, others, least_low)
         });
         let high = || {
-            let found = self
-                .highest
-                .doubtful(&self.lowest, few_high, |height, _, others| is_far(height, others, least_high))?;
-            let [low, high] = found.others;
-            let height = SharedHeight { value: 0.0 - found.height.value, ..found.height };
-            Some(DoubtfulHeight { height, others: [0.0 - high, 0.0 - low] })
+            self.highest.doubtful(&self.lowest, few_high, |height, _, others| is_far(height.value, others, least_high))
         };
-        low.or_else(high)
+        low.or_else(|| high().map(DoubtfulHeight::with_other_sign))
     }
 
-    /// Returns the lowest value if several records share it, and it lies below all others by many times their range. Nearer than a
-    /// [`Extremes::doubtful`] one, it may be water.
-    pub(crate) fn set_apart(&self, metres: f64) -> Option<DoubtfulHeight> {
-        self.lowest.doubtful(&self.highest, FEW[0], |height, _, [low, high]| {
-            let gap = low - height;
-            gap * metres >= LEAST_GAP && gap >= TIMES_RANGE * (high - low)
-        })
+    /// Returns the lowest value if several records share it, and it lies below all others by many times their range, or the lowest or the
+    /// highest that few of all `records` share, and that lies apart. Nearer than a [`Extremes::doubtful`] one, it may be water, or a roof.
+    pub(crate) fn set_apart(&self, metres: f64, records: u64) -> Option<DoubtfulHeight> {
+        let [usual_gap, tower] = [USUAL_GAP, TOWER].map(|gap| gap / metres);
+        let is_usual = |height: &SharedHeight, value: f64, others: [f64; 2]| {
+            is_usual_number(value) && height.is_set_apart(records, others, usual_gap, TIMES_OF_USUAL)
+        };
+        let low = self.lowest.doubtful(&self.highest, FEW[0], |height, _, others| {
+            let gap = others[0] - height.value;
+            let is_deep = gap * metres >= LEAST_GAP && gap >= TIMES_RANGE * (others[1] - others[0]);
+            is_deep || is_usual(height, height.value, others)
+        });
+        let high = || {
+            self.highest.doubtful(&self.lowest, FEW[1], |height, _, others| {
+                is_usual(height, 0.0 - height.value, others)
+                    || height.is_set_apart(records, others, tower, TIMES_OF_TOWER)
+            })
+        };
+        low.or_else(|| high().map(DoubtfulHeight::with_other_sign))
     }
 
     /// Returns warnings about the heights of records that the user takes for nodata, and that other heights of the file are next to.
@@ -267,7 +314,7 @@ impl Lowest {
         &self,
         top: &Lowest,
         few: u64,
-        is_apart: impl Fn(f64, &[SharedHeight], [f64; 2]) -> bool,
+        is_apart: impl Fn(&SharedHeight, &[SharedHeight], [f64; 2]) -> bool,
     ) -> Option<DoubtfulHeight> {
         let greatest = 0.0 - top.0.first()?.value;
         let is_shared = |(at, height): &(usize, &SharedHeight)| {
@@ -277,7 +324,7 @@ impl Lowest {
         let (at, height) = self.0.iter().enumerate().find(is_shared)?;
         let above = &self.0[at + 1..];
         let others = [above.first()?.value, greatest];
-        let is_doubtful = above.len() >= LEAST_VALUES && is_apart(height.value, above, others);
+        let is_doubtful = above.len() >= LEAST_VALUES && is_apart(height, above, others);
         is_doubtful.then_some(DoubtfulHeight { height: *height, others })
     }
 }
@@ -451,16 +498,45 @@ mod tests {
             extremes(std::iter::repeat_n(0.0, zeros).chain(others))
         };
         let value = |found: Option<DoubtfulHeight>| found.map(|doubt| doubt.height.value);
-        assert_eq!((value(plain(5, 85.0, 10.0).set_apart(1.0)), plain(5, 85.0, 10.0).doubtful(1.0)), (Some(0.0), None));
-        assert_eq!(value(plain(5, 60.0, 2.0).set_apart(1.0)), Some(0.0));
-        assert_eq!(value(plain(2, 60.0, 2.0).set_apart(1.0)), None);
-        assert_eq!(value(plain(50, 60.0, 8.0).set_apart(1.0)), None);
-        assert_eq!(value(plain(50, 4.0, 0.4).set_apart(1.0)), None);
+        assert_eq!(
+            (value(plain(5, 85.0, 10.0).set_apart(1.0, 1_000)), plain(5, 85.0, 10.0).doubtful(1.0)),
+            (Some(0.0), None)
+        );
+        assert_eq!(value(plain(5, 60.0, 2.0).set_apart(1.0, 1_000)), Some(0.0));
+        assert_eq!(value(plain(2, 60.0, 2.0).set_apart(1.0, 1_000)), None);
+        assert_eq!(value(plain(50, 60.0, 8.0).set_apart(1.0, 500)), None);
+        assert_eq!(value(plain(50, 4.0, 0.4).set_apart(1.0, 1_000)), None);
         // The same in millimetres, and in feet.
-        assert_eq!(value(plain(6, 500.0, 60.0).set_apart(0.001)), None);
+        assert_eq!(value(plain(6, 500.0, 60.0).set_apart(0.001, 1_000)), None);
         assert_eq!(value(plain(6, 500.0, 60.0).doubtful(0.001)), None);
         assert_eq!(value(plain(6, 500.0, 60.0).doubtful(0.3048)), Some(0.0));
         assert_eq!(value(plain(6, 300.0, 60.0).doubtful(0.3048)), None);
+    }
+
+    #[test]
+    fn a_value_of_few_records_that_lies_apart_for_the_range_of_the_others_is_set_apart() {
+        let hills = |mark: f64, count: usize, from: f64, range: f64| {
+            let others = (0..900).map(move |i| from + range * f64::from(i % 97) / 96.0);
+            let found = extremes(std::iter::repeat_n(mark, count).chain(others)).set_apart(1.0, 1_000);
+            found.map(|doubt| (doubt.height.value, doubt.others))
+        };
+        assert_eq!(hills(0.0, 60, 28.0, 42.0), Some((0.0, [28.0, 70.0])));
+        assert_eq!(hills(255.0, 60, 17.0, 32.0), Some((255.0, [17.0, 49.0])));
+        assert_eq!(hills(400.0, 60, 17.0, 32.0), Some((400.0, [17.0, 49.0])));
+        assert_eq!(hills(-1.0, 60, 67.0, 32.0), Some((-1.0, [67.0, 99.0])));
+        assert_eq!(hills(0.0, 60, -70.0, 42.0), Some((0.0, [-70.0, -28.0])));
+        // Near for the range of the others, or at all, or of few records, or of many.
+        for (mark, count, from, range) in [
+            (0.0, 60, 28.0, 96.0),
+            (0.0, 60, 9.0, 3.0),
+            (0.0, 4, 28.0, 42.0),
+            (0.0, 100, 28.0, 42.0),
+            // No usual number: the floor of a quarry, and a tower.
+            (560.0, 60, 700.0, 20.0),
+            (149.0, 60, 0.0, 20.0),
+        ] {
+            assert_eq!(hills(mark, count, from, range), None, "{mark} {count} {from} {range}");
+        }
     }
 
     #[test]

@@ -72,14 +72,26 @@ pub(crate) fn find(rows: &[&[u8]], candidates: &[Delimiter], wanted: Option<bool
         None if named => Header { lines: after(0), names: None, count: count_in(lines[0]) },
         None if count_in(lines[0]).is_some() => Header { lines: 1, names: None, count: count_in(lines[0]) },
         None => {
-            let error = match lines[0].trim_ascii() {
+            let (what, line) = line_of_most_names(lines);
+            let error = match line.trim_ascii() {
                 line if !line.is_empty() && line.iter().all(u8::is_ascii_digit) => Some(HeaderLineError::LargeCount),
                 line if is_like_count(line) => Some(HeaderLineError::NoCount),
                 line => names(line).err(),
             };
             let error = error.map(|error| error.to_string()).unwrap_or_default();
-            Header { lines: 1, names: Some(Err(format!("the first line, {}, {error}", shown(lines[0])))), count: None }
+            Header { lines: 1, names: Some(Err(format!("{what}, {}, {error}", shown(line)))), count: None }
         }
+    }
+}
+
+/// Returns the line that names most of x, y and z, and what to call it. Titles and comments may stand before it.
+fn line_of_most_names<'a>(lines: &[&'a [u8]]) -> (&'static str, &'a [u8]) {
+    let named = |line: &[u8]| CANDIDATES.iter().map(|own| coordinates(without_mark(*own, line).1.into_iter())).max();
+    // Of several, the first.
+    let most = lines.iter().skip(1).rev().max_by_key(|line| named(line)).filter(|line| named(line) > named(lines[0]));
+    match most {
+        Some(line) if named(line) >= Some(2) => ("the line of names", line),
+        _ => ("the first line", lines[0]),
     }
 }
 

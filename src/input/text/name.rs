@@ -155,6 +155,8 @@ pub(crate) const NAMES: [Names; 10] = [
             "magassag",
             "yukseklik",
             "высота",
+            "rl",
+            "reducedlevel",
         ],
         ColumnRole::Coordinate(2),
     ),

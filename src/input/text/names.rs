@@ -161,6 +161,8 @@ mod tests {
             "E;N;H",
             "Ost;Nord;Hoehe",
             "este;norte;cota",
+            "Easting;Northing;RL",
+            "Easting;Northing;Reduced Level (m)",
             "Easting (m);Northing (m);Elevation (m)",
         ] {
             assert_eq!(coordinates(line), Some([0, 1, 2]), "{line}");

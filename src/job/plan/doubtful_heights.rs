@@ -78,7 +78,8 @@ fn doubt_about(
     let metres = metres * source.factor_of_heights();
     let record = if is_text { "line" } else { "point" };
     let error = || heights.doubtful(metres).map(|doubt| Doubt { what: of_doubt(&doubt, record), stops: true });
-    let warning = || heights.set_apart(metres).map(|doubt| Doubt { what: of_doubt(&doubt, record), stops: false });
+    let apart = || heights.set_apart(metres, source.records);
+    let warning = || apart().map(|doubt| Doubt { what: of_doubt(&doubt, record), stops: false });
     error().or_else(warning)
 }
 

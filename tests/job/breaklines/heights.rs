@@ -167,6 +167,44 @@ fn roofs_over_low_ground_are_not_doubtful() {
     assert!(!text.contains("seem to be") && !text.contains("heights of feature"), "{text}");
 }
 
+/// Most vertices of the roof lie over low points, and a few beside points of the roof itself.
+#[test]
+fn a_roof_whose_height_some_points_share_is_in_no_other_unit() {
+    let roof = |high: bool| {
+        let roof = [[20.0, 20.0], [60.0, 20.0], [60.0, 60.0], [20.0, 60.0]].map(|[x, y]| [x, y, 13.1]).to_vec();
+        let ground = |i: u32| ("line", vec![[90.0, 9.0 * f64::from(i), 4.0], [140.0, 9.0 * f64::from(i), 4.0]]);
+        let lines: Vec<_> = std::iter::once(("line", roof)).chain((1..9).map(ground)).collect();
+        let is_roof = move |x: f64, y: f64| high && (58.0..66.0).contains(&x) && (58.0..66.0).contains(&y);
+        said_on(&Features::lines(&lines), "", move |x, y, _| if is_roof(x, y) { 13.1 } else { 4.0 })
+    };
+    let text = roof(false);
+    assert!(text.contains("the heights of feature 1 seem to be in feet"), "{text}");
+    let text = roof(true);
+    assert!(!text.contains("height"), "{text}");
+}
+
+/// A waterline at a quay or a dyke may lie at 0.
+#[test]
+fn a_line_at_0_under_low_even_ground_is_named_among_lines_on_the_ground() {
+    let said = |ground: fn(f64) -> f64, others: f64| {
+        let at = |i: u32, y: f64| 11.0 + 9.0 * f64::from(i) + y / 50.0;
+        let line = |number: u32| {
+            let y = 7.0 + 15.0 * f64::from(number);
+            let z = |x: f64| if number == 4 { 0.0 } else { ground(x) + others };
+            ("line", (0..15).map(|i| [at(i, y), y, z(at(i, y))]).collect())
+        };
+        said_on(&Features::lines(&(0..9).map(line).collect::<Vec<_>>()), "", |x, _, _| ground(x))
+    };
+    let text = said(|x| 7.0 + x / 500.0, 0.0);
+    assert!(text.contains("feature 5 has the height 0 at (500012, 4000067)"), "{text}");
+    for (ground, others) in
+        [((|x| 7.0 + x / 500.0) as fn(f64) -> f64, 3.0), (|x| 2.6 + x / 500.0, 0.0), (|x| 7.0 + x / 2.0 % 2.0, 0.0)]
+    {
+        let text = said(ground, others);
+        assert!(!text.contains("height"), "{text}");
+    }
+}
+
 /// The remedy that was taken is not offered again.
 #[test]
 fn a_wrong_unit_of_heights_is_named() {

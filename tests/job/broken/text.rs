@@ -37,6 +37,11 @@ pub(super) fn cases() -> Vec<Case> {
         ("a header without z", b"x,y,height\n1,2,3\n".to_vec(), Refused(3, "three different places")),
         ("a header without y", b"x,why,z\n1,2,3\n".to_vec(), Refused(3, "names no column y")),
         ("words", b"once upon a time\nthere was\n".to_vec(), Refused(3, "names no column x")),
+        (
+            "names below a title",
+            b"; Site: Kingsford Rd\n; Easting, Northing, Bottom\n1,2,3\n2,3,4\n".to_vec(),
+            Refused(3, "the line of names, \"; Easting, Northing, Bottom\", names no column z"),
+        ),
         ("one number a line", b"1\n2\n3\n4\n".to_vec(), Refused(3, "")),
         ("two numbers a line", b"1,2\n3,4\n5,6\n".to_vec(), Refused(3, "")),
         ("decimal commas", b"1,5;2,5;3,5\n1,6;2,5;3,5\n2,5;9,5;1\n".to_vec(), Read(3, 0, "")),

@@ -30,6 +30,14 @@ const SHORE: f64 = 1.0;
 /// A height of 0 is doubtful where the terrain is so many metres above or below it: in a feature with other heights, and in one without.
 const FROM_ZERO: [f64; 2] = [3.0, 10.0];
 
+/// A feature without any other height than 0 is doubtful nearer to an even terrain, if most other features lie on the points: where it is so many
+/// metres above or below, and so many times as far as the points around differ. Quays are lower.
+const FROM_EVEN: f64 = 4.0;
+const TIMES_EVEN: f64 = 10.0;
+
+/// Other features lie on the points if they are no more than so many metres beyond.
+const ON_POINTS: f64 = 1.0;
+
 /// A vertex is doubtful if it lies so many metres beyond its neighbours on the line and beyond the terrain.
 const SPIKE: f64 = 10.0;
 
@@ -91,8 +99,15 @@ impl Judge<'_> {
         }
         let known = in_other_unit.as_ref().map(|(known, _)| known.as_slice()).unwrap_or_default();
         let others = features.iter().filter(|feature| !known.contains(&feature.id.feature));
-        let vertices = self.of_vertices(others);
+        let vertices = self.of_vertices(others, self.are_on_points(&by_feature));
         in_other_unit.map(|(_, sentence)| sentence).into_iter().chain(vertices).collect()
+    }
+
+    /// Tells whether most features with heights lie on the points. `pairs` are those of each feature.
+    fn are_on_points(&self, pairs: &[Vec<Pair>]) -> bool {
+        let apart = pairs.iter().filter_map(|pairs| median(pairs.iter().map(|(z, around)| around.beyond(*z).abs())));
+        median(apart).is_some_and(|apart| apart <= self.terrain.in_height_unit(ON_POINTS))
+            && pairs.iter().filter(|pairs| !pairs.is_empty()).count().saturating_mul(2) > pairs.len()
     }
 
     /// Returns the heights of some vertices of a file, and what is around them.
@@ -147,9 +162,12 @@ impl Judge<'_> {
         })
     }
 
-    /// Returns a sentence about the vertices that are far from the terrain, by features.
-    fn of_vertices<'f>(&self, features: impl Iterator<Item = &'f Feature>) -> Option<String> {
-        let mut found = features.filter_map(|feature| Some((feature, self.doubtful_vertex(feature)?)));
+    /// Returns a sentence about the vertices that are far from the terrain, by features. `on_points` tells whether most features of the file lie
+    /// on the points.
+    fn of_vertices<'f>(&self, features: impl Iterator<Item = &'f Feature>, on_points: bool) -> Option<String> {
+        let zero = |feature| self.zero_on_even(feature).filter(|_| on_points);
+        let doubtful = |feature| self.doubtful_vertex(feature).or_else(|| zero(feature));
+        let mut found = features.filter_map(|feature| Some((feature, doubtful(feature)?)));
         let (feature, (vertex, around, doubt)) = found.next()?;
         let others = match found.count() {
             0 => String::new(),
@@ -200,6 +218,24 @@ impl Judge<'_> {
             let slack = around.relief().min(gentle);
             (beyond.abs() > from_zero + slack + fall * outside).then_some((vertex, around, doubt))
         })
+    }
+
+    /// Returns the first vertex of a line without any other height than 0 of which most lies off an even terrain. The water of a lake may lie
+    /// deep below its shore.
+    fn zero_on_even<'f>(&self, feature: &'f Feature) -> Option<(&'f Vertex, Around, Doubt)> {
+        let mut vertices = feature.paths.iter().flatten();
+        let is_all_zero = vertices.all(|vertex| vertex.z.is_none() || self.terrain.is_zero(vertex));
+        let off = |vertex: &'f Vertex| {
+            let (z, around) = self.terrain.pair(vertex)?;
+            let least = self.terrain.in_height_unit(FROM_EVEN).max(TIMES_EVEN * around.relief());
+            Some((vertex, around, around.beyond(z).abs() - least))
+        };
+        let off: Vec<_> = evenly(feature).filter_map(off).collect();
+        let is_off = is_all_zero
+            && feature.kind != FeatureKind::Lake
+            && median(off.iter().map(|(_, _, more)| *more)).is_some_and(|more| more > 0.0);
+        let (vertex, around, _) = off.into_iter().find(|(_, _, more)| is_off && *more > 0.0)?;
+        Some((vertex, around, Doubt::Zero))
     }
 
     /// Returns why the height of a vertex may be missing.

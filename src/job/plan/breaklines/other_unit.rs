@@ -20,6 +20,9 @@ const FEATURE_APART: f64 = 5.0;
 /// Converted, the heights of a feature lie nearer to the middle of the points around than these to each other, or than so many metres.
 const ON_GROUND: f64 = 0.5;
 
+/// Where one in so many vertices of a feature is as high as a point around, that is its height: roofs over low ground stand out of most points.
+const SHARED: usize = 8;
+
 /// Of the features that lie off the terrain, so many in a hundred fit when they are converted. Of many roofs and bridges, a few do by chance.
 const MOST: usize = 80;
 
@@ -209,10 +212,16 @@ impl UnitJudge<'_> {
         Some(factor)
     }
 
-    /// Tells whether a feature lies off the terrain.
+    /// Tells whether a feature lies off the terrain, and hardly any point around shares its height.
     fn is_off(&self, pairs: &[Pair]) -> bool {
         let beyond = median(pairs.iter().map(|(z, around)| around.beyond(*z)));
+        let near = self.terrain.in_height_unit(ON_GROUND);
+        let is_shared = |(z, around): &&Pair| {
+            [around.lowest, around.middle, around.highest].iter().any(|point| (z - point).abs() < near)
+        };
+        let shared = pairs.iter().filter(is_shared).count();
         beyond.is_some_and(|beyond| beyond.abs() > self.terrain.in_height_unit(FEATURE_APART))
+            && shared.saturating_mul(SHARED) < pairs.len()
     }
 
     /// Tells whether a feature that lies off the terrain lies on it after its heights are multiplied by `factor`.
