@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::crs::plausible::plausible;
 use crate::input::crs::system::Crs;
+use crate::input::crs::unit::Unit;
 use crate::input::decoded_chunks::DecodedChunks;
 use crate::input::file::random_access::RandomAccessFile;
 use crate::input::las::crs_records;
@@ -96,6 +97,9 @@ pub struct Source {
     pub has_intensity: bool,
     /// The coordinate reference system.
     pub crs: Crs,
+    /// The unit of lengths in a false record of a geocentric system, if it states one: that of the plane where nothing else states a unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    unit_of_false_record: Option<Unit>,
     /// The number of points by return, from the first on, as a LAS header claims it; empty for text.
     pub by_return: Vec<u64>,
     /// What the user should know about the file.
@@ -190,6 +194,7 @@ fn open_las(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
         has_returns: true,
         has_intensity: true,
         crs,
+        unit_of_false_record: None,
         by_return: header.by_return,
         warnings,
         transform: None,
@@ -229,6 +234,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         has_returns: table.has_returns(choice.returns),
         has_intensity: table.has_intensity(),
         crs: Crs { horizontal: table.unit, vertical: table.unit_z, ..Crs::default() },
+        unit_of_false_record: None,
         by_return: Vec::new(),
         warnings,
         transform: None,

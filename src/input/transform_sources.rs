@@ -5,10 +5,10 @@ use crate::input::crs::datum::Sameness;
 use crate::input::crs::system::{Crs, CrsKind};
 use crate::input::crs::target::TargetCrs;
 use crate::input::crs::transform::between::{CrsTransform, DatumNote};
-use crate::input::crs::unit::same_length;
+use crate::input::crs::unit::{Unit, same_length};
 use crate::input::crs::vertical::VerticalSystem;
 use crate::input::middle_zone::zone_of_middle;
-use crate::input::options::InputOptions;
+use crate::input::options::{InputOptions, UnitChoice};
 use crate::input::said_crs::{no_way, said_crs, said_or_missing};
 use crate::input::source::{FileFormat, Source};
 use crate::input::source_transform::SourceTransform;
@@ -39,6 +39,7 @@ pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warning
         for source in sources.iter_mut().filter(|_| options.missing_crs.is_some()) {
             source.crs = said_or_missing(source, options)?;
         }
+        take_units_of_false_records(sources, options);
         return Ok(());
     };
     let said = sources.iter().map(|source| said_crs(source, sources, options)).collect::<Result<Vec<Crs>>>()?;
@@ -60,6 +61,19 @@ pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warning
     warn_of_datums(sources, &notes, warnings);
     warn_of_scale(sources, &to, warnings);
     Ok(())
+}
+
+/// Takes the units that false records state, where neither the user nor any file states another.
+fn take_units_of_false_records(sources: &mut [Source], options: &InputOptions) {
+    let is_unit_open = match &options.crs {
+        CrsChoice::None => false,
+        CrsChoice::Given { crs, .. } => crs.horizontal == Unit::Unknown,
+        CrsChoice::First | CrsChoice::Auto => true,
+    };
+    let is_silent = |source: &Source| source.crs.horizontal == Unit::Unknown;
+    if is_unit_open && options.unit == UnitChoice::Auto && sources.iter().all(is_silent) {
+        sources.iter_mut().for_each(|source| source.crs.horizontal = source.unit_of_false_record().unwrap_or_default());
+    }
 }
 
 /// Has the points of one source transformed, if they are not in `to` already. Returns what is done about the datums.

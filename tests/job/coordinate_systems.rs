@@ -128,6 +128,42 @@ fn the_cure_of_a_geocentric_system_is_one_that_helps() {
 }
 
 #[test]
+fn the_unit_of_a_false_record_gives_way_to_every_other_statement() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = [3_101_800.0, 10_070_600.0, 0.0];
+    let file = |name: &str, records: &[(u16, Vec<u8>)]| {
+        let path = write(folder.path(), name, records);
+        move_to(&path, place);
+        path
+    };
+    let texas = file("texas.las", &[code(2277)]);
+    let silent = file("silent.las", &[keys(&[[2048, 0, 1, 6317]])]);
+    let in_metres = file("metres.las", &[keys(&[[2048, 0, 1, 6317], [3076, 0, 1, 9001]])]);
+    for record in [&silent, &in_metres] {
+        for (files, lines) in [
+            (vec![&texas, record], ""),
+            (vec![&texas, record], "missing_crs = \"EPSG:2277\""),
+            (vec![&texas, record], "unit = \"us-foot\""),
+            (vec![record], "missing_crs = \"EPSG:2277\""),
+            (vec![record], "crs = \"EPSG:2277\""),
+        ] {
+            let job = ellipsoidal(&files).with("input", lines);
+            let report = job.report();
+            assert_eq!(report["unit"], "us-foot", "{lines}");
+            assert_eq!(report["crs"], "NAD83 / Texas Central (ftUS)", "{lines}");
+            assert_eq!(georeference(&job, "metres_per_unit"), 1200.0 / 3937.0, "{lines}");
+            assert!(!warnings(&report).contains("otherwise"), "{report}");
+        }
+        let lines = "missing_crs = \"EPSG:2277\"\nto_crs = \"EPSG:26914\"";
+        assert_eq!(Job::on(&[&texas, record]).with("input", lines).report()["crs"], "NAD83 / UTM zone 14N");
+    }
+    let said = warnings(&Job::on(&[&silent]).report());
+    assert!(said.contains("no input says a unit of length that is known: coordinates are taken as metres"), "{said}");
+    let said = warnings(&Job::on(&[&in_metres]).report());
+    assert!(said.contains("taken as a plane in the unit metre") && !said.contains("no input says a unit"), "{said}");
+}
+
+#[test]
 fn geocentric_coordinates_are_refused_by_code_text_and_keys() {
     let folder = tempfile::tempdir().unwrap();
     let version_1 = r#"GEOCCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],

@@ -124,9 +124,8 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
     let horizontal = match unit {
         _ if kind == CrsKind::Geographic => Unit::Degree,
         Some(metres) => Unit::from_metres(Some(metres)),
-        None if kind == CrsKind::Geocentric => {
-            Unit::from_metres(unit_of(keys, GEOCENTRIC_UNITS, GEOCENTRIC_UNIT_SIZE).or(Some(1.0)))
-        }
+        // The metre that such a system has without a key is no statement about points that are not in it.
+        None if kind == CrsKind::Geocentric => Unit::from_metres(unit_of(keys, GEOCENTRIC_UNITS, GEOCENTRIC_UNIT_SIZE)),
         None => known.horizontal,
     };
     let heights = VerticalSystem {
@@ -137,7 +136,7 @@ pub(crate) fn parse(keys: &GeoKeys) -> Option<Crs> {
     let unit_of_height = keys.code(VERTICAL_UNITS).and_then(metres).or_else(|| heights.metres_of_code());
     let mut crs = Crs {
         // If a key gives another unit than the code, the text of the code would be wrong.
-        wkt: known.wkt.filter(|_| known.horizontal == horizontal),
+        wkt: known.wkt.filter(|_| horizontal == Unit::Unknown || known.horizontal == horizontal),
         epsg,
         kind,
         horizontal,

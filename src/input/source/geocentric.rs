@@ -34,7 +34,7 @@ const NO_HEIGHT: f64 = 20_000.0;
 
 impl Source {
     /// Drops a record of a geocentric system if most points of a sample lie far from the surface of the earth: then it is false, and the
-    /// coordinates are a plane. Its unit stays.
+    /// coordinates are a plane. Its unit, if it states one, is that of the plane only where nothing else states a unit.
     ///
     /// # Errors
     /// `Io` or `Input` if the file cannot be read any more.
@@ -65,14 +65,23 @@ impl Source {
                 None => return Ok(()),
             },
         };
+        let stated = Some(self.crs.horizontal).filter(|unit| *unit != Unit::Unknown);
+        let in_unit = stated.map_or_else(String::new, |unit| {
+            format!(" in the unit {} (set [input] unit to state another)", unit.name())
+        });
         self.warnings.push(format!(
             "its coordinate system ({}) is geocentric, but {why}. The record is ignored: unless [input] crs, missing_crs or another file \
-             states what the points are in, they are taken as a plane in the unit {} (set [input] unit to state another)",
+             states what the points are in, they are taken as a plane{in_unit}",
             self.crs.label(),
-            Unit::from_metres(Some(metres)).name()
         ));
-        self.crs = Crs { horizontal: self.crs.horizontal, ..Crs::default() };
+        self.crs = Crs::default();
+        self.unit_of_false_record = stated;
         Ok(())
+    }
+
+    /// Returns the unit that a false record of a geocentric system states for lengths; `None` if there is no such record or it states none.
+    pub(crate) fn unit_of_false_record(&self) -> Option<Unit> {
+        self.unit_of_false_record
     }
 
     /// Returns whether the box that the file claims lies on the surface of the earth as geocentric coordinates in metres do, with a z that

@@ -116,6 +116,8 @@ fn dropped_unit(source: &Source, [plane, heights]: [f64; 2]) -> Option<String> {
     let is_text = source.format == FileFormat::Text;
     let other = |own: Option<f64>, taken: f64| own.filter(|own| !is_text && !same_length(*own, taken));
     let name = |metres| Unit::from_metres(Some(metres)).name();
-    let of_plane = other(crs.metres_per_unit(), plane).map(|own| format!("{} for x and y", name(own)));
+    let of_false_record = || source.unit_of_false_record().and_then(|unit| unit.metres_per_unit());
+    let of_plane =
+        other(crs.metres_per_unit().or_else(of_false_record), plane).map(|own| format!("{} for x and y", name(own)));
     of_plane.or_else(|| other(crs.vertical, heights).map(|own| format!("{} for z", name(own))))
 }
