@@ -204,19 +204,24 @@ mod tests {
 
     const SOUTH: [f64; 3] = [-93.0, 44.0, 100.0];
 
-    /// Returns where a vertex of a line comes to, and what is said.
-    fn bring_vertex(vertex: [f64; 3], own: &Crs, choice: &str, points: &Crs) -> Result<([f64; 3], Warnings)> {
+    /// Returns a file with a line of this vertex alone, as it lies among the points.
+    fn brought(vertex: [f64; 3], own: &Crs, rest: &str, points: &Crs) -> Result<LineFile> {
         let shape = LineShape::Line(vec![vertex; 2]);
-        let features = vec![LineFeature { number: 1, kind: FeatureKind::Line, shape }];
         let mut file = LineFile {
             path: "a.gpkg".into(),
             crs: own.clone(),
             height_scale: 1.0,
-            features,
+            features: vec![LineFeature { number: 1, kind: FeatureKind::Line, shape }],
             warnings: Warnings::default(),
         };
-        let options = toml::from_str(&format!("files = [\"a\"]\ncrs = {choice:?}")).unwrap();
+        let options = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
         bring_to_points(&mut file, &options, &system_of(points, DatumRule::Strict))?;
+        Ok(file)
+    }
+
+    /// Returns where a vertex of a line comes to, and what is said.
+    fn bring_vertex(vertex: [f64; 3], own: &Crs, choice: &str, points: &Crs) -> Result<([f64; 3], Warnings)> {
+        let file = brought(vertex, own, &format!("crs = {choice:?}"), points)?;
         Ok((file.features[0].shape.outlines()[0][1], file.warnings))
     }
 
@@ -308,17 +313,7 @@ mod tests {
     }
     /// Returns the height that 10 becomes, and what is said.
     fn height(own: &Crs, rest: &str, points: &Crs) -> (f64, String) {
-        let shape = LineShape::Line(vec![[5e5, 49e5, 10.0]; 2]);
-        let features = vec![LineFeature { number: 1, kind: FeatureKind::Line, shape }];
-        let mut file = LineFile {
-            path: "a.gpkg".into(),
-            crs: own.clone(),
-            height_scale: 1.0,
-            features,
-            warnings: Warnings::default(),
-        };
-        let options = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
-        bring_to_points(&mut file, &options, &system_of(points, DatumRule::Strict)).unwrap();
+        let file = brought([5e5, 49e5, 10.0], own, rest, points).unwrap();
         (file.features[0].shape.outlines()[0][0][2], file.warnings.iter().collect::<Vec<_>>().join("; "))
     }
 
