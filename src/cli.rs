@@ -1,9 +1,9 @@
 //! The command line: the commands and their options.
 
-use crate::job::phase::{MOST_TASKS, Phase, Task};
 use crate::submit::Engine;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use clap_complete::Shell;
+use job::phase::{MOST_TASKS, Phase, Task};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
@@ -251,7 +251,7 @@ fn host_name(text: &str) -> Result<String, String> {
 }
 
 fn memory(text: &str) -> Result<u64, String> {
-    crate::job::options::MemoryLimit::try_from(text.to_owned()).map(|memory| memory.0)
+    job::options::MemoryLimit::try_from(text.to_owned()).map(|memory| memory.0)
 }
 
 #[cfg(test)]

@@ -1,15 +1,17 @@
 //! A short job on a made-up terrain, with a GPU and without it: whether the results are the same, and how much time the GPU saves.
 
-use crate::gpu::selftest::{self, SelfTest};
-use crate::job::options::RunOptions;
-use crate::job::progress::number_text::grouped;
-use crate::job::progress::stage::ProgressOutput;
-use crate::job::report::job_report::Report;
-use crate::triangulation::MIN_POINTS_PER_THREAD;
-use crate::{Error, Result, config, interrupt, job, sample};
+use crate::{config, sample};
+use delaunay_gpu::selftest;
+use delaunay_gpu::selftest::SelfTest;
+use delaunay_gpu::triangulator::MIN_POINTS_PER_THREAD;
+use job::options::RunOptions;
+use job::progress::number_text::grouped;
+use job::progress::stage::ProgressOutput;
+use job::report::job_report::Report;
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use sys::{Error, Result, interrupt};
 
 /// Points of the terrain: enough that a job takes seconds.
 const POINTS: u64 = 4_000_000;

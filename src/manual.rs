@@ -1,11 +1,11 @@
 //! The man page, made from the definition of the command line.
 
 use crate::cli::Cli;
-use crate::{Error, Result};
 use clap::{Command, CommandFactory};
 use clap_mangen::Man;
 use roff::{Roff, roman};
 use std::io;
+use sys::{Error, Result};
 
 /// What the program is called, whatever its file is called.
 const PROGRAM: &str = "gdt-batch";

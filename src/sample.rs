@@ -1,13 +1,13 @@
 //! A synthetic terrain for trials and tests: hills with a lake, made from a seed and scanned in rows as from an aircraft, with
 //! classes and colours.
 
-use crate::{Error, Result, interrupt};
 use las::point::{Classification, Format};
 use las::{Builder, Color, Point, Transform, Vector, Vlr, Writer};
 use std::f64::consts::TAU;
 use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::Path;
+use sys::{Error, Result, interrupt};
 
 /// Points per square metre.
 const DENSITY: f64 = 4.0;

@@ -6,17 +6,17 @@ mod short_message;
 
 use crate::config::paths::{Anchored, anchor, as_pattern};
 use crate::config::short_message::shortened;
-use crate::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
-use crate::input::lines::options::LineOptions;
-use crate::input::options::{InputOptions, is_by_url};
-use crate::job::options::{JobOptions, Limits};
-use crate::output::options::OutputOptions;
-use crate::path_text::encoded;
-use crate::triangulation::options::{Backend, MaxPointsPerPart, MaxPointsPerTile, TriangulationOptions};
-use crate::{Error, Result, Warnings};
+use delaunay_gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
+use delaunay_gpu::triangulation_options::{Backend, MaxPointsPerPart, MaxPointsPerTile, TriangulationOptions};
 use glob::Pattern;
+use job::options::{JobOptions, Limits};
+use points::lines::options::LineOptions;
+use points::options::{InputOptions, is_by_url};
 use serde::Deserialize;
 use std::path::Path;
+use sys::path_text::encoded;
+use sys::{Error, Result, Warnings};
+use tiles::options::OutputOptions;
 
 /// A configuration file as it was written.
 #[derive(Deserialize)]
@@ -270,8 +270,8 @@ fn glob_prefix(directory: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::options::Duplicates;
-    use crate::output::options::OutputFormat;
+    use points::options::Duplicates;
+    use tiles::options::OutputFormat;
 
     const LEAST: &str = "[input]\nfiles = [\"a.laz\"]\n[output]\ndirectory = \"out\"\n";
 

@@ -3,9 +3,9 @@
 //! `~/` is the home directory, as everywhere. Variables are refused: the same configuration would read and write somewhere else in
 //! another shell, or, where a variable is not set, in a folder called `$NAME`.
 
-use crate::path_text::is_pattern;
 use glob::Pattern;
 use std::path::{Path, PathBuf, is_separator};
+use sys::path_text::is_pattern;
 
 /// A path, and the directory that it counts from.
 #[derive(Debug, PartialEq)]

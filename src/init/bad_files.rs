@@ -1,11 +1,11 @@
 //! What lets a job run though some of its files are bad: leaving them out, or reading what is there of them.
 
 use crate::init::draft::{Draft, NeededLine};
-use crate::input::{self, Source};
-use crate::job::plan::inputs::input_paths;
-use crate::job::plan::text_inputs::allowed_malformed;
-use crate::{Error, Result};
+use job::plan::inputs::input_paths;
+use job::plan::text_inputs::allowed_malformed;
+use points::Source;
 use rayon::prelude::*;
+use sys::{Error, Result};
 
 /// The step of fractions that are written.
 const STEP: f64 = 1e-4;
@@ -32,7 +32,7 @@ pub(crate) fn lines_for_bad_files(draft: &Draft) -> Result<Option<Vec<NeededLine
     }
     let options = draft.options()?;
     let paths = input_paths(&options.input)?;
-    let opened: Vec<Result<Source>> = paths.par_iter().map(|path| input::open(path, &options.input.csv)).collect();
+    let opened: Vec<Result<Source>> = paths.par_iter().map(|path| points::open(path, &options.input.csv)).collect();
     let (mut good, mut bad) = (Vec::new(), Vec::new());
     for source in opened {
         match source {

@@ -2,12 +2,12 @@
 
 use crate::init::config_folder::{ConfigFolder, named};
 use crate::init::folder_files::{FolderFiles, LASER, TEXT, kind_of, leads_nowhere};
-use crate::input::{self, TextOptions, is_url};
-use crate::path_text::{PATTERN_SIGNS, is_pattern};
-use crate::{Error, Result};
+use points::{TextOptions, is_url};
 use std::collections::{BTreeMap, HashSet};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
+use sys::path_text::{PATTERN_SIGNS, is_pattern};
+use sys::{Error, Result};
 
 /// So many files that are all of their kind in a folder are named by a pattern.
 const MANY: usize = 6;
@@ -149,7 +149,7 @@ fn missing(argument: &Path, path: &Path, error: io::Error) -> Error {
 fn point_clouds(texts: Vec<PathBuf>) -> Result<(Vec<PathBuf>, Vec<Error>)> {
     let (mut clouds, mut others) = (Vec::new(), Vec::new());
     for text in texts {
-        match input::open(&text, &TextOptions::default()) {
+        match points::open(&text, &TextOptions::default()) {
             Ok(_) => clouds.push(text),
             Err(why @ Error::Input { .. }) => others.push(why),
             Err(error) => return Err(error),

@@ -2,10 +2,10 @@
 
 use crate::init::config_folder::named;
 use crate::init::configuration::FIRST_WORDS;
-use crate::{Error, Result, interrupt};
 use std::fs::{File, Metadata};
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use sys::{Error, Result, interrupt};
 
 /// No configuration is longer. What is longer is something else, and may be very long.
 const LONGEST: u64 = 1 << 20;

@@ -1,8 +1,8 @@
 //! How a configuration names files: paths and patterns that count from its folder.
 
-use crate::job::plan::named_files::paths_like;
-use crate::{Error, Result};
+use job::plan::named_files::paths_like;
 use std::path::{Component, Path, PathBuf};
+use sys::{Error, Result};
 
 /// The folder of a configuration that is to be written.
 pub(crate) struct ConfigFolder {
@@ -128,7 +128,7 @@ fn escaped(path: &str) -> String {
 mod tests {
     use super::*;
     use crate::config;
-    use crate::job::plan::inputs::input_paths;
+    use job::plan::inputs::input_paths;
     use std::fs;
 
     /// A folder that is not the current one.

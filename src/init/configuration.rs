@@ -4,10 +4,10 @@ use crate::init::draft::{Draft, NeededLine, quoted};
 use crate::init::findings::{Findings, NO_UNIT_OF_HEIGHTS, rectangle, unit_of_heights};
 use crate::init::needs::Runnable;
 use crate::init::page::Page;
-use crate::input::{Source, Unit};
-use crate::job::plan::job_plan::Plan;
-use crate::job::preflight::check::Preflight;
-use crate::output::page::is_built_in;
+use job::plan::job_plan::Plan;
+use job::preflight::check::Preflight;
+use points::{Source, Unit};
+use tiles::page::is_built_in;
 
 /// What every configuration begins with that `init` writes.
 pub(crate) const FIRST_WORDS: &str = "A job for gdt-batch";

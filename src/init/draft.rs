@@ -2,11 +2,11 @@
 
 use crate::config;
 use crate::init::config_folder::ConfigFolder;
-use crate::job::options::JobOptions;
-use crate::terminal::is_obeyed;
-use crate::{Error, Result};
+use job::options::JobOptions;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use sys::terminal::is_obeyed;
+use sys::{Error, Result};
 
 /// A line of the configuration that the clouds need, or the machine.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

@@ -1,11 +1,11 @@
 //! What was found about the clouds, in sentences for a configuration.
 
 use crate::init::draft::Draft;
-use crate::input::surface_doubts::listed;
-use crate::input::{Crs, FileFormat, Source, Unit};
-use crate::job::plan::job_plan::Plan;
-use crate::job::preflight::check::Preflight;
-use crate::job::progress::number_text::{grouped, mebibytes};
+use job::plan::job_plan::Plan;
+use job::preflight::check::Preflight;
+use job::progress::number_text::{grouped, mebibytes};
+use points::surface_doubts::listed;
+use points::{Crs, FileFormat, Source, Unit};
 
 /// The most systems that a sentence names.
 const MOST_NAMED: usize = 3;

@@ -1,9 +1,9 @@
 //! What is in a folder in which `init` looks for point clouds.
 
 use crate::init::config_folder::named;
-use crate::{Error, Result};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use sys::{Error, Result};
 
 /// The endings of the names of LAS and LAZ files.
 pub(crate) const LASER: [&str; 2] = ["las", "laz"];

@@ -27,16 +27,16 @@ use crate::init::draft::{Draft, options_of};
 use crate::init::needs::runnable;
 use crate::init::page::harmless;
 use crate::init::refusals::with_way_out;
-use crate::job::durable::directory::JobDirectory;
-use crate::job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
-use crate::job::plan::inputs::input_paths;
-use crate::job::preflight::check::Preflight;
-use crate::job::progress::number_text::{grouped, mebibytes};
 use crate::shell_word::quoted;
-use crate::{Error, Result};
+use job::durable::directory::JobDirectory;
+use job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
+use job::plan::inputs::input_paths;
+use job::preflight::check::Preflight;
+use job::progress::number_text::{grouped, mebibytes};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use sys::{Error, Result};
 
 pub use crate::init::draft::NeededLine;
 
@@ -57,7 +57,7 @@ const LONGEST_STEM: usize = 100;
 #[derive(Debug, Serialize)]
 pub struct NewConfiguration {
     /// Its file; `None` if it is for standard output.
-    #[serde(serialize_with = "crate::path_text::shown_if_any")]
+    #[serde(serialize_with = "sys::path_text::shown_if_any")]
     pub file: Option<PathBuf>,
     /// The lines that the clouds need, or the machine.
     pub needed: Vec<NeededLine>,

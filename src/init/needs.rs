@@ -8,14 +8,14 @@ use crate::init::offers::Offers;
 use crate::init::refusals::Refusals;
 use crate::init::systems::Ways;
 use crate::init::triangle::may_have_triangle;
-use crate::input::Source;
-use crate::job::plan::job_plan::{Plan, PlannedInput};
-use crate::job::plan::no_points::{no_point_is_left, no_triangle};
-use crate::job::plan::text_inputs::{allowed_malformed, count, stop_at};
-use crate::job::preflight::check::{Preflight, look};
-use crate::{Error, Result};
+use job::plan::job_plan::{Plan, PlannedInput};
+use job::plan::no_points::{no_point_is_left, no_triangle};
+use job::plan::text_inputs::{allowed_malformed, count, stop_at};
+use job::preflight::check::{Preflight, look};
+use points::Source;
 use rayon::prelude::*;
 use std::io::ErrorKind;
+use sys::{Error, Result};
 
 /// A configuration that runs, and what `check` says of it.
 pub(crate) struct Runnable {

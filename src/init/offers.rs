@@ -1,11 +1,11 @@
 //! Which options a configuration offers that some clouds take and others refuse: each is tried as `check` would try it.
 
-use crate::Result;
 use crate::init::draft::{Draft, NeededLine};
-use crate::input::FileFormat;
-use crate::job::plan::job_plan::Plan;
-use crate::job::preflight::check::{Preflight, look};
+use job::plan::job_plan::Plan;
+use job::preflight::check::{Preflight, look};
+use points::FileFormat;
 use std::path::Path;
+use sys::Result;
 
 /// Options that the job would take.
 #[derive(Clone, Copy)]
@@ -20,7 +20,7 @@ impl Offers {
     /// Tries the options on the job of `draft`.
     ///
     /// # Errors
-    /// [`crate::Error::Broken`] if the program does not take what is written.
+    /// [`sys::Error::Broken`] if the program does not take what is written.
     pub(crate) fn of(draft: &Draft, preflight: &Preflight, plan: &Plan) -> Result<Offers> {
         let shares = preflight.surface_sample;
         let has_ground = shares.ground > 0 && shares.ground < shares.points;

@@ -1,7 +1,7 @@
 //! A page of TOML: comments, lines that count, and options that stand there as comments.
 
 use crate::init::draft::NeededLine;
-use crate::terminal::is_obeyed;
+use sys::terminal::is_obeyed;
 
 /// No line of prose is longer, apart from a word that is.
 const WIDTH: usize = 100;

@@ -1,7 +1,7 @@
 //! Why no configuration makes a job of the clouds.
 
-use crate::Error;
 use crate::init::draft::Draft;
+use sys::Error;
 
 /// What messages call the table of options that `init` never writes.
 const OF_TEXTS: &str = "[input.csv]";

@@ -1,11 +1,11 @@
 //! What lets a job run though its clouds are in degrees or in different coordinate reference systems.
 
 use crate::init::draft::{Draft, NeededLine};
-use crate::input::{self, Crs, FileFormat, Source, Unit};
-use crate::job::plan::inputs::input_paths;
-use crate::{Error, Result};
+use job::plan::inputs::input_paths;
+use points::{Crs, FileFormat, Source, Unit};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
+use sys::{Error, Result};
 
 /// The most systems that a sentence names.
 const MOST_NAMED: usize = 4;
@@ -38,7 +38,7 @@ impl Ways {
     /// Those of opening them.
     pub(crate) fn of(draft: &Draft) -> Result<Ways> {
         let options = draft.options()?;
-        let open = |path: &std::path::PathBuf| match input::open(path, &options.input.csv) {
+        let open = |path: &std::path::PathBuf| match points::open(path, &options.input.csv) {
             // What is left out has no say.
             Err(Error::Input { .. }) if draft.sets("on_bad_file") => Ok(None),
             opened => opened.map(Some),

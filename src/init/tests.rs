@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::config;
-use crate::job::preflight::check::check;
+use job::preflight::check::check;
 use std::fs;
 
 /// Makes the configuration of the clouds in `folder`.

@@ -1,8 +1,8 @@
 //! Whether there is a triangle in the points of a job.
 
-use crate::input::Point;
-use crate::job::plan::job_plan::Plan;
-use crate::{Result, interrupt};
+use job::plan::job_plan::Plan;
+use points::Point;
+use sys::{Result, interrupt};
 
 /// The most chunks in which a triangle is looked for. Nearly every cloud has one in its first points.
 const MOST_CHUNKS: usize = 64;

@@ -4,15 +4,15 @@
 //! ten seconds at first, then after twice as long each time, up to some minutes. Nothing waits in a pod, so phases that come later
 //! never take the room of those that come first.
 
-use crate::job::phase::{Phase, PhaseTasks};
 use crate::submit::request::Request;
 use crate::submit::submitted::{SentTasks, Submitted};
-use crate::{Error, Result};
 use clap::Parser;
+use job::phase::{Phase, PhaseTasks};
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
+use sys::{Error, Result};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// The name of the engine.
@@ -312,8 +312,8 @@ fn kubectl(options: &KubernetesOptions, arguments: &[&str], input: &str) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::phase::Phase;
     use crate::submit::request::tests::request;
+    use job::phase::Phase;
 
     const LEAST: [&str; 4] = ["--image", "registry/gdt-batch:1", "--volume", "survey:/data"];
 

@@ -1,13 +1,13 @@
 //! The engine "local": the tasks of a job as processes of this program on this machine, phase after phase. For tests, and for machines
 //! without a scheduler.
 
-use crate::job::phase::{Phase, PhaseTasks};
 use crate::shell_word::quoted;
 use crate::submit::request::Request;
-use crate::{Error, Result, interrupt, say, threads};
+use job::phase::{Phase, PhaseTasks};
 use std::ffi::OsString;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
+use sys::{Error, Result, interrupt, say, threads};
 
 /// How often the engine looks whether a task has ended.
 const PAUSE: Duration = Duration::from_millis(10);

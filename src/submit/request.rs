@@ -1,9 +1,9 @@
 //! What is sent to an engine: the tasks that are missing, and what they need of a machine.
 
-use crate::job::options::JobOptions;
-use crate::job::phase::PhaseTasks;
-use crate::{Error, Result};
+use job::options::JobOptions;
+use job::phase::PhaseTasks;
 use std::path::{Path, PathBuf};
+use sys::{Error, Result};
 
 /// The tasks of a job that an engine has to start.
 #[derive(Clone, Debug)]

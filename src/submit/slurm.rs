@@ -3,12 +3,12 @@
 use crate::submit::request::Request;
 use crate::submit::slurm_script::{Array, ENGINE, Script, arrays, dry_run, scripts, sent_path};
 use crate::submit::submitted::{SentTasks, Submitted};
-use crate::{Error, Result, disk};
 use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use sys::{Error, Result, disk};
 
 /// `MaxArraySize` where nobody sets it.
 const DEFAULT_LIMIT: u32 = 1001;

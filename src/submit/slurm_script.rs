@@ -3,9 +3,9 @@
 //! A phase waits for the end of the one before, however that ends (`afterany`): with `afterok`, a phase would never run after a task
 //! that failed and was done by a later submission. Every phase checks by itself that what it needs is complete.
 
-use crate::job::phase::{Phase, PhaseTasks};
 use crate::shell_word::quoted;
 use crate::submit::request::Request;
+use job::phase::{Phase, PhaseTasks};
 use std::path::{Path, PathBuf};
 
 /// The name of the engine, with which its folder ends.

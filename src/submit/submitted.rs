@@ -1,7 +1,7 @@
 //! What was sent to an engine.
 
-use crate::job::phase::Phase;
 use crate::submit::slurm_script::ranges;
+use job::phase::Phase;
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ pub struct Submitted {
     /// A command that shows how they fare.
     pub watch: String,
     /// Where the tasks' logs are, if they are files.
-    #[serde(serialize_with = "crate::path_text::shown_if_any")]
+    #[serde(serialize_with = "sys::path_text::shown_if_any")]
     pub logs: Option<PathBuf>,
 }
 

@@ -16,19 +16,19 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::output::file_names::OutputFiles;
-use crate::output::page::page_for;
 use crate::view::hosts::Hosts;
 use crate::view::results::Results;
 use crate::view::server::Server;
 use crate::view::site::Site;
-use crate::{Error, Result};
+use sys::{Error, Result};
+use tiles::file_names::OutputFiles;
+use tiles::page::page_for;
 
 /// A terrain that waits for browsers: `Display` is for people, `Serialize` for programs.
 #[derive(Serialize)]
 pub struct View {
     /// The output directory.
-    #[serde(serialize_with = "crate::path_text::shown")]
+    #[serde(serialize_with = "sys::path_text::shown")]
     pub directory: PathBuf,
     /// The address of the page.
     pub url: String,

@@ -11,8 +11,8 @@ use std::time::SystemTime;
 
 use serde::Deserialize;
 
-use crate::output::checksums::{Checksum, parse_list, read_file};
-use crate::output::file_names::{OutputFiles, level_uri, tile_uri, tileset_uri};
+use tiles::checksums::{Checksum, parse_list, read_file};
+use tiles::file_names::{OutputFiles, level_uri, tile_uri, tileset_uri};
 
 /// The name of the report from the output directory.
 const REPORT: &str = "report.json";
@@ -104,9 +104,9 @@ fn is_of_terrain(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::checksums::list_text;
     use std::fs;
     use tempfile::TempDir;
+    use tiles::checksums::list_text;
 
     /// Returns a folder with a list of files with these names, and a report with the checksum of the list.
     fn folder(names: &[&str]) -> TempDir {

@@ -15,7 +15,7 @@ use tokio::time::{sleep, timeout};
 use crate::view::impatient_stream::ImpatientStream;
 use crate::view::response::response;
 use crate::view::site::Site;
-use crate::{Error, Result, interrupt};
+use sys::{Error, Result, interrupt};
 
 /// How long the server may take to see that it was asked to stop.
 const PATIENCE: Duration = Duration::from_millis(200);

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use gdt_batch::Result;
-use gdt_batch::geometry::lattice::{AxisMap, Lattice, REACH};
+use gdt_batch::geometry::REACH;
+use gdt_batch::geometry::lattice::{AxisMap, Lattice};
 use gdt_batch::input::{KeptReturns, OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;

@@ -5,7 +5,7 @@ use super::flips::stuck_after_flips;
 use super::linked::LinkedMesh;
 use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::geometry::{Site, lattice::REACH};
+use gdt_batch::geometry::{REACH, Site};
 use gdt_batch::gpu::atlas::{Atlas, AtlasLeaf};
 use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::leaf_flags::ISLANDS_LEFT;

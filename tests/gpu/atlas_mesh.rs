@@ -125,7 +125,7 @@ fn assert_starts_are_near(placed: &PlacedAtlas, leaf: usize, records: &[u32], st
 /// Leaves of few sites, thin leaves and lattices whose textures just fill their blocks, or just do not.
 fn small_leaves() -> Vec<Vec<Site>> {
     let mut random = Random(17);
-    let far = gdt_batch::geometry::lattice::REACH;
+    let far = gdt_batch::geometry::REACH;
     let mut leaves = vec![
         vec![[0, 0], [5, 5], [9, 0]],
         vec![[3, 3], [4, 3], [3, 4]],
@@ -304,7 +304,7 @@ fn the_small_leaves_find_every_error_in_the_shaders() {
 /// Leaves of the same sites, near and far: what the rounds of flips do to one has nothing to do with the others.
 #[test]
 fn flips_stay_within_their_leaf() {
-    let far = gdt_batch::geometry::lattice::REACH;
+    let far = gdt_batch::geometry::REACH;
     let cloud = clouds().into_iter().find(|cloud| cloud.name == "coarse").expect("there is such a cloud");
     let near: Vec<Site> = cloud.sites[..3000].to_vec();
     let moved = |by: i32| near.iter().map(|&[x, y]| [x - by, y + by - (1 << 21)]).collect::<Vec<_>>();

@@ -3,8 +3,8 @@
 use super::clouds::{clouds, hard_clouds, real_cloud};
 use super::instant::Answer;
 use super::random::Random;
+use gdt_batch::geometry::REACH;
 use gdt_batch::geometry::Site;
-use gdt_batch::geometry::lattice::REACH;
 use gdt_batch::mesh::half_edge::HalfEdgeMesh;
 use gdt_batch::mesh::index::HalfEdgeIndex;
 use gdt_batch::triangulation::canonical;

@@ -2,8 +2,8 @@
 
 use super::random::Random;
 use super::rig::Rig;
+use gdt_batch::geometry::REACH;
 use gdt_batch::geometry::Site;
-use gdt_batch::geometry::lattice::REACH;
 use gdt_batch::geometry::predicates::{in_circle, in_circle_determinant, orient2d};
 use gdt_batch::gpu::buffer_id::BufferId;
 use gdt_batch::gpu::recording::{GpuCommand, Recording};

@@ -1,7 +1,8 @@
 //! The rules of a job: which points are kept, and where they land on the lattice.
 
 use gdt_batch::Error;
-use gdt_batch::geometry::lattice::{Lattice, REACH};
+use gdt_batch::geometry::REACH;
+use gdt_batch::geometry::lattice::Lattice;
 use gdt_batch::input::{OptionalFields, Point, RawBounds, TextOptions, open};
 
 use crate::cloud::{decode, file, lattice, rules};

@@ -1,5 +1,4 @@
 use super::*;
-use crate::output::checksums::{Checksum, list_text};
 use crate::view::hosts::Hosts;
 use crate::view::results::Results;
 use flate2::read::GzDecoder;
@@ -8,6 +7,7 @@ use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::path::Path;
 use std::thread;
 use tempfile::TempDir;
+use tiles::checksums::{Checksum, list_text};
 
 /// A folder with files, served on a port of its own until the test process ends.
 struct Rig {

@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use gdt_batch::geometry::lattice::{AxisMap, REACH};
+use gdt_batch::geometry::REACH;
+use gdt_batch::geometry::lattice::AxisMap;
 use gdt_batch::input::{KeptReturns, OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
 use gdt_batch::job::options::JobOptions;
 use gdt_batch::{Error, Result};

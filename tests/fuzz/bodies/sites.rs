@@ -28,7 +28,7 @@ pub(crate) fn sites(bytes: &[u8]) {
 fn sites_of(bytes: &[u8]) -> Vec<Site> {
     let Some((&choice, bytes)) = bytes.split_first() else { return Vec::new() };
     let (bits, far, shear) = (choice & 7, choice >> 3 & 3, choice >> 5);
-    // The farthest site is within `geometry::lattice::REACH`, as all sites of a job are.
+    // The farthest site is within `geometry::REACH`, as all sites of a job are.
     let step = [1, 3, 1 << 12, 1 << 19][far as usize];
     let coordinate = |byte: u8| (byte >> (7 - bits)) as i32 - (1 << bits >> 1);
     let site = |pair: &[u8]| {

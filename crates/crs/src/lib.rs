@@ -1,0 +1,34 @@
+//! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two systems agree.
+//! This room knows no files: the readers of file formats hand it the records that describe the system.
+
+#![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
+
+pub(crate) mod area_of_projection;
+pub mod area_of_use;
+pub mod choice;
+pub(crate) mod codes;
+pub mod crs_name;
+pub mod datum;
+pub(crate) mod datum_names;
+pub(crate) mod doubts;
+pub(crate) mod form;
+pub mod from_records;
+pub mod from_wkt;
+pub mod geoid;
+pub mod geokeys;
+pub(crate) mod geotiff;
+pub(crate) mod geotiff_esri;
+#[cfg(test)]
+mod geotiff_tests;
+pub(crate) mod geotiff_text;
+pub mod plausible;
+pub(crate) mod proj4;
+pub(crate) mod projection;
+pub(crate) mod projection_names;
+pub mod rectangle;
+pub mod system;
+pub mod target;
+pub mod transform;
+pub mod unit;
+pub mod vertical;
+pub(crate) mod wkt;

@@ -1,0 +1,163 @@
+//! Files that appear under their name only when they are whole and on the disk.
+//!
+//! A step writes a file under its partial name ([`write_pending`]). [`publish`] brings it to the disk and then renames it.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::thread::ScopedJoinHandle;
+use sys::disk::WriteFrom;
+use sys::{Error, Result, disk};
+use tiles::checksums::Checksum;
+use xxhash_rust::xxh3::Xxh3;
+
+/// A file that a step has written under its [`partial_path`], until [`publish`] gives it its name.
+#[derive(Clone, Debug)]
+pub struct PendingFile {
+    /// Its final path.
+    pub path: PathBuf,
+    /// Its size in bytes.
+    pub bytes: u64,
+    /// The checksum of its content.
+    pub checksum: Checksum,
+}
+
+/// Writes `content` under the [`partial_path`] of `path`.
+///
+/// # Errors
+/// [`Error::Io`] if writing fails.
+pub fn write_pending(path: &Path, content: &[u8]) -> Result<PendingFile> {
+    write_pending_pieces(path, &[content])
+}
+
+/// The system begins at once to bring files of so many bytes or more to the disk. So little is left to wait for at the end of a job.
+const WORTH_BEGINNING: u64 = 256 << 10;
+
+/// Writes the concatenated `pieces` under the [`partial_path`] of `path`.
+///
+/// # Errors
+/// [`Error::Io`] if writing fails.
+pub fn write_pending_pieces(path: &Path, pieces: &[&[u8]]) -> Result<PendingFile> {
+    let partial = partial_path(path);
+    let write = |file: File| {
+        let mut writer = WriteFrom { file: &file, at: 0 };
+        pieces.iter().try_for_each(|piece| writer.write_all(piece))?;
+        if writer.at >= WORTH_BEGINNING {
+            disk::begin_sync(&file);
+        }
+        Ok(())
+    };
+    disk::create(&partial).and_then(write).map_err(Error::io("write", &partial))?;
+    let mut hasher = Xxh3::new();
+    pieces.iter().for_each(|piece| hasher.update(piece));
+    let bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
+    Ok(PendingFile { path: path.into(), bytes, checksum: Checksum::of_hasher(&hasher) })
+}
+
+/// Writes the lines under the [`partial_path`] of `path`, without holding all of them in memory.
+///
+/// # Errors
+/// [`Error::Io`] if writing fails, and the first error of a line.
+pub fn write_pending_lines(path: &Path, lines: impl IntoIterator<Item = Result<String>>) -> Result<()> {
+    const BUFFER: usize = 1 << 20;
+    let partial = partial_path(path);
+    let file = disk::create(&partial).map_err(Error::io("write", &partial))?;
+    let mut writer = BufWriter::with_capacity(BUFFER, WriteFrom { file: &file, at: 0 });
+    for line in lines {
+        writer.write_all(line?.as_bytes()).map_err(Error::io("write", &partial))?;
+    }
+    writer.flush().map_err(Error::io("write", &partial))
+}
+
+/// Returns the pending file of `path` when something else has written it under its [`partial_path`].
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read.
+pub fn find_pending(path: &Path) -> Result<PendingFile> {
+    let partial = partial_path(path);
+    let (bytes, checksum) = Checksum::of_file(&partial).map_err(Error::io("read", &partial))?;
+    Ok(PendingFile { path: path.into(), bytes, checksum })
+}
+
+/// Returns the name under which the file at `path` waits until it is whole.
+pub fn partial_path(path: &Path) -> PathBuf {
+    // A world file has the name of its picture but for the ending, and the raster that of the scene of all tiles.
+    path.with_extension(match path.extension() {
+        Some(ending) if ending == "pgw" => "pgw.partial",
+        Some(ending) if ending == "tif" => "tif.partial",
+        _ => "partial",
+    })
+}
+
+/// How many threads wait for the disk at the same time.
+const PARALLEL_SYNCS: usize = 8;
+
+/// Gives pending files their names. A file is on the disk before its name is, and all names are on the disk before this returns.
+///
+/// # Errors
+/// [`Error::Io`] if a file cannot be synced or renamed.
+pub fn publish(paths: &[PathBuf]) -> Result<()> {
+    sync_partial_files(paths)?;
+    for path in paths {
+        disk::rename(&partial_path(path), path).map_err(Error::io("rename the finished file to", path))?;
+    }
+    let folders: BTreeSet<&Path> = paths.iter().filter_map(|path| path.parent()).collect();
+    folders.into_iter().try_for_each(sync_folder)
+}
+
+/// Brings pending files to the disk on several threads: overlapping waits take little longer than one.
+fn sync_partial_files(paths: &[PathBuf]) -> Result<()> {
+    let share = paths.len().div_ceil(PARALLEL_SYNCS).max(1);
+    let sync = |paths: &[PathBuf]| paths.iter().try_for_each(|path| sync_file(&partial_path(path)));
+    std::thread::scope(|scope| {
+        let mut shares = paths.chunks(share);
+        let own = shares.next().unwrap_or_default();
+        let start = |share| std::thread::Builder::new().spawn_scoped(scope, move || sync(share)).map_err(|_| share);
+        let others: Vec<_> = shares.map(start).collect();
+        let own = sync(own);
+        // If a thread could not be started, this one does its share.
+        let join = |other| match other {
+            Ok(thread) => ScopedJoinHandle::join(thread).unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            Err(share) => sync(share),
+        };
+        others.into_iter().map(join).fold(own, Result::and)
+    })
+}
+
+fn sync_file(path: &Path) -> Result<()> {
+    let file = disk::open(path).map_err(Error::io("open", path))?;
+    disk::sync(&file).map_err(Error::io("write", path))
+}
+
+/// Brings the names in `folder` to the disk.
+///
+/// # Errors
+/// [`Error::Io`] if that fails.
+pub fn sync_folder(folder: &Path) -> Result<()> {
+    disk::sync_folder(folder).map_err(Error::io("write", folder))
+}
+
+/// Creates the folder at `path`, and those above it, if need be.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be made.
+pub fn create_folder(path: &Path) -> Result<()> {
+    disk::create_folder(path).map_err(Error::io("create the directory", path))
+}
+
+/// Creates the folder that the file at `path` is to be in, and those above it, if need be.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be made.
+pub fn create_folder_of(path: &Path) -> Result<()> {
+    path.parent().map_or(Ok(()), create_folder)
+}
+
+/// Removes the file at `path` if it exists.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be removed.
+pub fn remove_file(path: &Path) -> Result<()> {
+    disk::remove_file(path).map_err(Error::io("remove", path))
+}

@@ -1,0 +1,125 @@
+//! A record of the store: a few columns of plain values, in the machine's byte order.
+//!
+//! A column is the number of its values as a `u128`, then the values, then zeros up to a multiple of 16 bytes: so values of any type
+//! are aligned in the file, and slices of it can be used as they are.
+
+use crate::durable::mapped::MappedSlice;
+use crate::durable::store::{RecordKey, RecordPlace, RecordRef, Store};
+use bytemuck::Pod;
+use sys::{Error, Result};
+
+/// Bytes to which columns are padded: the alignment of `u128`, the largest of plain values.
+const ALIGNMENT: usize = size_of::<u128>();
+
+/// Collects columns and writes them as one record.
+#[derive(Default)]
+pub struct ColumnWriter<'a> {
+    /// The number of values of each column, and their bytes.
+    columns: Vec<([u8; ALIGNMENT], &'a [u8])>,
+}
+
+impl<'a> ColumnWriter<'a> {
+    /// Adds a column.
+    pub fn push<T: Pod>(mut self, column: &'a [T]) -> ColumnWriter<'a> {
+        self.columns.push(((column.len() as u128).to_ne_bytes(), bytemuck::cast_slice(column)));
+        self
+    }
+
+    /// Writes the record of `key`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if writing fails.
+    pub fn write<K: RecordKey>(self, store: &Store<K>, key: K) -> Result<RecordRef<K>> {
+        let padding = |bytes: &[u8]| &[0; ALIGNMENT][..bytes.len().next_multiple_of(ALIGNMENT) - bytes.len()];
+        let pieces = self.columns.iter().flat_map(|(length, bytes)| [&length[..], bytes, padding(bytes)]);
+        store.put(key, &pieces.collect::<Vec<&[u8]>>())
+    }
+}
+
+/// Reads the columns of a record in the order in which they were written.
+pub struct ColumnReader<'a, K> {
+    store: &'a Store<K>,
+    key: K,
+    /// What is left of the record.
+    rest: RecordPlace,
+}
+
+impl<'a, K: RecordKey> ColumnReader<'a, K> {
+    /// Finds the record of `key`.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if the store has none.
+    pub fn open(store: &'a Store<K>, key: K) -> Result<ColumnReader<'a, K>> {
+        Ok(ColumnReader { store, key, rest: store.place(key)? })
+    }
+
+    /// Returns the next column.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if reading fails, [`Error::Broken`] if the record is shorter than the column says.
+    pub fn column<T: Pod>(&mut self) -> Result<MappedSlice<'static, T>> {
+        let count = self.count::<T>()?;
+        let column = self.store.read(self.key, self.rest.at, count)?;
+        self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)?;
+        Ok(column)
+    }
+
+    /// Returns the next column as values of the caller's own, read without a map in between.
+    ///
+    /// # Errors
+    /// As [`ColumnReader::column`].
+    pub fn column_vec<T: Pod>(&mut self) -> Result<Vec<T>> {
+        let count = self.count::<T>()?;
+        let column = self.store.read_vec(self.key, self.rest.at, count)?;
+        self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)?;
+        Ok(column)
+    }
+
+    /// Returns whether the record has no more columns.
+    pub fn is_at_end(&self) -> bool {
+        self.rest.length == 0
+    }
+
+    /// Goes on to the column after the next.
+    ///
+    /// # Errors
+    /// As [`ColumnReader::column`].
+    pub fn skip_column<T: Pod>(&mut self) -> Result<()> {
+        let count = self.count::<T>()?;
+        self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)
+    }
+
+    /// Returns `count` values of the last column from the one at `first` on, without reading the others.
+    ///
+    /// # Errors
+    /// As [`ColumnReader::column`].
+    pub fn column_part<T: Pod>(mut self, first: usize, count: usize) -> Result<MappedSlice<'static, T>> {
+        let length = self.count::<T>()?;
+        if first.checked_add(count).is_none_or(|end| end > length) {
+            return Err(self.ends_too_early());
+        }
+        self.store.read(self.key, self.rest.at + (first * size_of::<T>()) as u64, count)
+    }
+
+    /// Reads the number of values in the next column, and checks that the record holds them all.
+    fn count<T: Pod>(&mut self) -> Result<usize> {
+        if self.rest.length < ALIGNMENT as u64 {
+            return Err(self.ends_too_early());
+        }
+        let count = self.store.read::<u128>(self.key, self.rest.at, 1)?[0];
+        self.skip(ALIGNMENT as u64)?;
+        let fits = count.checked_mul(size_of::<T>() as u128).is_some_and(|bytes| bytes <= self.rest.length as u128);
+        if fits { Ok(count as usize) } else { Err(self.ends_too_early()) }
+    }
+
+    fn skip(&mut self, bytes: u64) -> Result<()> {
+        let RecordPlace { at, length } = self.rest;
+        let left = length.checked_sub(bytes).ok_or_else(|| self.ends_too_early())?;
+        self.rest = RecordPlace { at: at + bytes, length: left };
+        Ok(())
+    }
+
+    fn ends_too_early(&self) -> Error {
+        Error::Broken(format!("{:?} in {} ends too early", self.key, self.store.path(self.key).display()))
+    }
+}

@@ -1,0 +1,69 @@
+//! Which files in an output directory are results of jobs: those that the list of a finished job names, or that of a job whose results are
+//! taking their places.
+
+use crate::durable::listing::exists;
+use std::collections::HashSet;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use sys::{Error, Result};
+use tiles::checksums::{Checksum, parse_list, read_file};
+use tiles::file_names::OutputFiles;
+
+/// The results of jobs, by their paths from the output directory.
+#[derive(Default)]
+pub(crate) struct KnownResults {
+    names: HashSet<PathBuf>,
+    /// Whether a list names them.
+    pub(crate) has_list: bool,
+}
+
+impl KnownResults {
+    /// Returns what the lists in these folders name, and the lists and the reports themselves.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a list cannot be read.
+    pub(crate) fn of(folders: &[&OutputFiles]) -> Result<KnownResults> {
+        let mut known = KnownResults::default();
+        for folder in folders {
+            let own = [folder.report(), folder.checksums()];
+            let names = own.iter().filter_map(|path| path.strip_prefix(folder.directory()).ok());
+            known.names.extend(names.map(Path::to_path_buf));
+            known.add(&folder.checksums())?;
+        }
+        Ok(known)
+    }
+
+    fn add(&mut self, list: &Path) -> Result<()> {
+        let text = match read_file(list) {
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
+            text => text.map_err(Error::io("read", list))?,
+        };
+        if let Some(files) = parse_list(&text) {
+            self.names.extend(files.into_iter().map(|(name, _)| PathBuf::from(name)));
+            self.has_list = true;
+        }
+        Ok(())
+    }
+
+    /// Tells whether a job wrote the file with this name.
+    pub(crate) fn contains(&self, name: &Path) -> bool {
+        self.names.contains(name)
+    }
+
+    /// Checks that the result with this name, which `waits`, takes the `place` of nothing but a result. A run that was cut off may have put
+    /// the same file there.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if a foreign file is there, [`Error::Io`] if it cannot be read.
+    pub(crate) fn check_place(&self, name: &Path, waits: &Path, place: &Path) -> Result<()> {
+        if self.contains(name) || !exists(place)? {
+            return Ok(());
+        }
+        let content = |path: &Path| Checksum::of_file(path).map_err(Error::io("read", path));
+        if content(waits)? == content(place)? {
+            return Ok(());
+        }
+        let what = "came during the job, and no job wrote it: move it away, and run the same command again";
+        Err(Error::Config(format!("{} {what}", place.display())))
+    }
+}

@@ -1,0 +1,129 @@
+//! Putting the results of a job in the place of those of an earlier one.
+//!
+//! Everything that can be found out, made or opened in advance is, while the earlier results are still whole: after that only
+//! renames, removals and syncs are left that can fail. Between the removal of the old report and the arrival of the new one some
+//! files are old and some are new, and there is no report. If a failure ends the run there, the next run goes on with it.
+
+use crate::durable::atomic_file::{create_folder, remove_file, sync_folder};
+use crate::durable::known_results::KnownResults;
+use crate::durable::listing::{Leftovers, check_page_is_ours, exists};
+use std::collections::{BTreeSet, HashSet};
+use std::io;
+use std::path::{Path, PathBuf};
+use sys::disk::OpenFolder;
+use sys::{Error, Result, disk, fault};
+use tiles::file_names::OutputFiles;
+
+/// What is to be done to put the results of a job in place.
+pub(crate) struct Replacement {
+    /// The report of the earlier job, or the place of the new one.
+    report: PathBuf,
+    new_report: PathBuf,
+    /// The results that wait, and their places, besides the report and the list.
+    waiting: Vec<(PathBuf, PathBuf)>,
+    /// The list of all results, if it waits, and its place. That of the earlier job tells which files are outdated, so it stays until
+    /// these are gone.
+    list: Option<(PathBuf, PathBuf)>,
+    /// Results of the earlier job that this one does not have.
+    outdated: Vec<PathBuf>,
+    directory: OpenFolder,
+    /// The folders of numbered files, each after those in it. They can be opened, but they are too many to keep open.
+    numbered_folders: Vec<PathBuf>,
+}
+
+impl Replacement {
+    /// Finds out what is to be done until the directory `results` holds the files with these `names` and no other results. Some of them
+    /// are in `waiting`, and some may be in their places already. Returns `None` if all are.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file is in neither place, or the system does not tell; if a folder cannot be made or opened. [`Error::Config`]
+    /// if a foreign file is in the place of a result. No result has been touched then.
+    pub(crate) fn prepare(
+        results: &OutputFiles,
+        waiting: &OutputFiles,
+        names: &HashSet<PathBuf>,
+    ) -> Result<Option<Replacement>> {
+        let [report, new_report] = [results, waiting].map(OutputFiles::report);
+        if !exists(&new_report)? && exists(&report)? {
+            // It goes last.
+            return Ok(None);
+        }
+        if names.iter().any(|name| results.directory().join(name) == results.page()) {
+            // Somebody may have put it there since the job wrote its own. The lists of results name that one by now.
+            check_page_is_ours(results)?;
+        }
+        // The list that waits names every new result, also where a foreign file has come into its place. That of the earlier job stays
+        // until all others are in place.
+        let (known, mut found) = (KnownResults::of(&[results])?, Vec::new());
+        // Neither what is done nor which file a message names may depend on the order of a hash set.
+        for name in names.iter().collect::<BTreeSet<_>>() {
+            let [place, waits] = [results, waiting].map(|folder| folder.directory().join(name));
+            if exists(&waits)? {
+                known.check_place(name, &waits, &place)?;
+                found.push((waits, place));
+            } else if waits == new_report || !exists(&place)? {
+                let gone =
+                    io::Error::new(io::ErrorKind::NotFound, "it is gone, and it is not among the results either");
+                return Err(Error::io("read", &waits)(gone));
+            }
+        }
+        found.retain(|(waits, _)| *waits != new_report);
+        let new_list = waiting.checksums();
+        let list = found.iter().position(|(waits, _)| *waits == new_list).map(|at| found.remove(at));
+        let mut outdated = Vec::new();
+        for path in Leftovers::of(results)?.files {
+            let name = path.strip_prefix(results.directory()).unwrap_or(&path);
+            // A file that no list names is foreign.
+            if path != report && !names.contains(name) && known.contains(name) && exists(&path)? {
+                outdated.push(path);
+            }
+        }
+        let folders: HashSet<&Path> = found.iter().filter_map(|(_, place)| place.parent()).collect();
+        folders.into_iter().try_for_each(create_folder)?;
+        let numbered_folders = Leftovers::of(results)?.folders;
+        numbered_folders.iter().try_for_each(|path| open(path).map(|_| ()))?;
+        let directory = open(results.directory())?;
+        Ok(Some(Replacement { report, new_report, waiting: found, list, outdated, directory, numbered_folders }))
+    }
+
+    /// Does it. Every file is replaced at once, so there is no moment without one.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be renamed or removed, or a folder cannot be synced.
+    pub(crate) fn carry_out(&self) -> Result<()> {
+        remove_file(&self.report)?;
+        sync(&self.directory)?;
+        for (waits, place) in &self.waiting {
+            fault::point("replacing");
+            rename(waits, place)?;
+        }
+        self.outdated.iter().try_for_each(|path| remove_file(path))?;
+        for folder in &self.numbered_folders {
+            // This fails, as it should, where a folder holds files of this job or of somebody else.
+            if disk::remove_folder(folder).is_err() {
+                sync_folder(folder)?;
+            }
+        }
+        sync(&self.directory)?;
+        if let Some((waits, place)) = &self.list {
+            fault::point("replacing");
+            rename(waits, place)?;
+            sync(&self.directory)?;
+        }
+        fault::point("replacing");
+        rename(&self.new_report, &self.report)?;
+        sync(&self.directory)
+    }
+}
+
+fn open(folder: &Path) -> Result<OpenFolder> {
+    OpenFolder::open(folder).map_err(Error::io("open", folder))
+}
+
+fn rename(from: &Path, to: &Path) -> Result<()> {
+    disk::rename(from, to).map_err(Error::io("rename the finished file to", to))
+}
+
+fn sync(folder: &OpenFolder) -> Result<()> {
+    folder.sync().map_err(Error::io("write", folder.path()))
+}

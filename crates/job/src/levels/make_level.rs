@@ -1,0 +1,212 @@
+//! Step 7, once for each coarser tile: reads the meshes of its children back from their files, joins and simplifies them.
+
+use crate::durable::directory::JobDirectory;
+use crate::index::{NodeIndex, PartIndex};
+use crate::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
+use crate::partition::tree::{NodeKind, Tree};
+use crate::records::{LevelSummary, StepOutput, Store, TileSummary};
+use crate::tiles::style::TileStyle;
+use crate::tiles::write_tile::write_glb;
+use delaunay::geometry::Bounds;
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+use std::path::{Path, PathBuf};
+use sys::{Error, Result};
+use tiles::frame::Frame;
+use tiles::gltf::read::{TileFile, read_tile};
+use tiles::lod::join::Joining;
+use tiles::lod::simplify::{Simplified, simplify};
+use tiles::tile::Tile;
+
+/// The figures of one coarser tile, or of all.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct LevelStats {
+    /// GLB files in `levels`.
+    pub files: u64,
+    /// Triangles in them.
+    pub triangles: u64,
+    /// Their bytes.
+    pub bytes: u64,
+    /// The greatest vertical distance between one of them and the exact mesh in metres.
+    pub error_m: f64,
+    /// Coarser tiles without a mesh, because the tiles below them take too much memory.
+    pub left_out: u64,
+}
+
+impl AddAssign for LevelStats {
+    fn add_assign(&mut self, other: LevelStats) {
+        self.files += other.files;
+        self.triangles += other.triangles;
+        self.bytes += other.bytes;
+        self.error_m = self.error_m.max(other.error_m);
+        self.left_out += other.left_out;
+    }
+}
+
+/// Where the coarser tiles of a job are made.
+pub struct LevelRoom<'a> {
+    /// Holds the tiles, finer and coarser.
+    pub directory: &'a JobDirectory,
+    /// Holds what `tileset.json` says of them.
+    pub store: &'a Store,
+    /// The coarser tiles.
+    pub hierarchy: &'a Hierarchy,
+    /// How tiles look.
+    pub style: &'a TileStyle,
+    /// How large coarser tiles are to be.
+    pub sizes: LevelSizes,
+    /// Whether they have meshes.
+    pub meshes: bool,
+    /// The part that they belong to; for those above the parts, the number of parts.
+    pub part: PartIndex,
+    /// Returns the topmost tile of a part.
+    pub top_of: TopOf<'a>,
+}
+
+/// Returns the topmost tile of a part.
+pub type TopOf<'a> = &'a (dyn Fn(PartIndex) -> Result<Child> + Sync);
+
+/// Spacings of a level in its error.
+const SPACINGS: f64 = 4.4;
+
+/// The greatest part of a tile's width that its error is. A tile of a few vertices is worth showing from afar all the same.
+const PART_OF_WIDTH: f64 = 0.5;
+
+/// Returns the error in metres by which viewers choose the level of a tile within `bounds`: a multiple of the distance between its
+/// vertices, because nothing smaller than that is left in it, and the height by which its triangles miss the surface. With the greatest
+/// distance instead, every tree would make all levels equally bad, and viewers would load the exact tiles.
+fn seen_error(simple: &Simplified, frame: &Frame, bounds: Bounds<3>) -> f64 {
+    let width = bounds.extent(0).max(bounds.extent(1)) as f64 * frame.resolution_metres()[0];
+    (SPACINGS * simple.spacing + simple.typical_error).min(PART_OF_WIDTH * width)
+}
+
+/// Makes coarser tile `index` of the hierarchy, whose children must exist. Stores what `tileset.json` says of it and of the exact
+/// tiles among its children. It has no mesh if its children have too many vertices for the memory, or if one of them has none for
+/// that reason.
+///
+/// # Errors
+/// [`Error::Io`] on the output or the store, [`Error::Broken`] if a file is not what an earlier step wrote.
+pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStats>> {
+    let coarse = &room.hierarchy.tiles[index];
+    let children = coarse.children.iter().map(|&child| Child::find(room, child)).collect::<Result<Vec<_>>>()?;
+    let bounds = children.iter().filter_map(|child| child.own.bounds()).reduce(Bounds::union);
+    let (mut stats, mut files) = (LevelStats::default(), Vec::new());
+    let mut own = TileSummary::new(bounds, 0);
+    if let (true, Some(bounds)) = (room.meshes, bounds) {
+        match memory_for(&children).filter(|bytes| *bytes <= room.sizes.memory) {
+            None => stats.left_out = 1,
+            Some(_) => {
+                let (tile, simple) = simplified(room, coarse.node, &children)?;
+                let of_children =
+                    |error: fn(&TileSummary) -> f64| children.iter().map(|c| error(&c.own)).fold(0.0, f64::max);
+                // No distance is greater than the range of heights: both meshes lie within it.
+                let greatest = of_children(|own| own.greatest_error) + simple.greatest_error;
+                own.greatest_error = greatest.min(height_range(&room.style.frame, bounds));
+                own.error = seen_error(&simple, &room.style.frame, bounds).max(of_children(|own| own.error));
+                own.vertices = tile.positions.len() as u32;
+                let path = room.directory.output().level(room.part.node_number(coarse.node));
+                let written = write_glb(&path, &tile, room.style)?;
+                let triangles = tile.triangles.len() as u64;
+                stats =
+                    LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.greatest_error, left_out: 0 };
+                files.push(written);
+            }
+        }
+    }
+    let leaves = children.iter().filter(|child| child.exact).map(|child| child.own).collect();
+    let record = LevelSummary { own, leaves }.save(room.store, coarse.node)?;
+    Ok(StepOutput { files, ..StepOutput::new(stats, vec![record]) })
+}
+
+/// Returns the bytes of memory that making coarser tile `index` takes, whose children must exist: 0 if it is left out.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the store.
+pub fn level_memory(room: &LevelRoom, index: usize) -> Result<u64> {
+    let children = room.hierarchy.tiles[index].children.iter().map(|&child| Child::find(room, child));
+    let needed = memory_for(&children.collect::<Result<Vec<_>>>()?);
+    Ok(needed.filter(|bytes| *bytes <= room.sizes.memory).unwrap_or(0))
+}
+
+/// Returns the bytes of memory that joining and simplifying `children` takes; `None` if one of them has been left out.
+fn memory_for(children: &[Child]) -> Option<u64> {
+    let vertices: u64 = children.iter().map(|child| u64::from(child.own.vertices)).sum();
+    let whole = children.iter().all(|child| child.own.vertices > 0 || child.own.bounds().is_none());
+    whole.then(|| vertices.saturating_mul(BYTES_PER_LEVEL_VERTEX))
+}
+
+/// Joins and simplifies the meshes of `children`, the tiles below `node`. Returns the coarser tile and what is known of it.
+fn simplified(room: &LevelRoom, node: NodeIndex, children: &[Child]) -> Result<(Tile, Simplified)> {
+    let vertices = children.iter().map(|child| child.own.vertices as usize).sum();
+    let mut joining = Joining::new(&room.style.frame, vertices);
+    for child in children.iter().filter(|child| child.own.vertices > 0) {
+        joining.add(read_own(&child.path)?).map_err(|what| contradiction(node, &what))?;
+    }
+    let joined = joining.finish();
+    let terrain = joined.terrain();
+    let target = room.sizes.target(terrain.triangles.len());
+    let mut simple = simplify(&room.style.frame, &terrain, target, room.style.lines.as_deref())?;
+    let mesh = std::mem::take(&mut simple.mesh);
+    Ok((joined.tile(mesh), simple))
+}
+
+/// Returns the range of heights in metres.
+fn height_range(frame: &Frame, bounds: Bounds<3>) -> f64 {
+    bounds.extent(2) as f64 * frame.resolution_metres()[1]
+}
+
+fn contradiction(node: NodeIndex, what: &impl std::fmt::Display) -> Error {
+    Error::Broken(format!("the tiles below node {node} do not fit together: {what}"))
+}
+
+/// A tile that a coarser one is made from.
+pub struct Child {
+    /// What `tileset.json` says of it.
+    own: TileSummary,
+    /// Whether it is an exact tile of the same part.
+    exact: bool,
+    /// Its GLB, if there is one.
+    path: PathBuf,
+}
+
+impl Child {
+    fn find(room: &LevelRoom, child: ChildTile) -> Result<Child> {
+        let output = room.directory.output();
+        match child {
+            ChildTile::Exact(tile) => {
+                let own = TileSummary::load(room.store, tile)?;
+                Ok(Child { own, exact: true, path: output.tile(tile.number()) })
+            }
+            ChildTile::Coarse(index) => {
+                let node = room.hierarchy.tiles[index].node;
+                let own = LevelSummary::load(room.store, node)?.own;
+                Ok(Child { own, exact: false, path: output.level(room.part.node_number(node)) })
+            }
+            ChildTile::Part(part) => (room.top_of)(part),
+        }
+    }
+
+    /// Returns the topmost tile of the part that `tree` cuts.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on the part's store.
+    pub fn top(directory: &JobDirectory, store: &Store, tree: &Tree) -> Result<Child> {
+        let output = directory.output();
+        let (own, path) = match tree.node(NodeIndex::ROOT).kind {
+            NodeKind::Leaf(tile) => (TileSummary::load(store, tile)?, output.tile(tile.number())),
+            NodeKind::Inner(_) => {
+                let own = LevelSummary::load(store, NodeIndex::ROOT)?.own;
+                (own, output.level(tree.part.node_number(NodeIndex::ROOT)))
+            }
+        };
+        Ok(Child { own, exact: false, path })
+    }
+}
+
+/// Reads a tile that this program wrote a moment ago: if it is bad, the program is.
+fn read_own(path: &Path) -> Result<TileFile> {
+    read_tile(path).map_err(|error| match error {
+        Error::Input { .. } => Error::Broken(error.to_string()),
+        other => other,
+    })
+}

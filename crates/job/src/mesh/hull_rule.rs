@@ -1,0 +1,126 @@
+//! Which way a triangle flows: the rule by which slivers along the hull are left out of what viewers see.
+//!
+//! An obtuse triangle flows over its longest edge, towards its circumcentre, if that edge is much longer than the spacing of the points.
+//! A triangle is **trimmed** if the way from triangle to triangle leads out of the hull. Any other way ends at a triangle that does not
+//! flow, as in a river or a void: what is around it stays. This is the flow of Edelsbrunner, Facello and Liang, "On the definition and
+//! the construction of pockets in macromolecules" (1998).
+//!
+//! The edges along a way grow strictly, so it ends. Else the triangles on both sides of an edge would be obtuse over it, and the sum of
+//! the two angles above a half turn, which no Delaunay triangulation has. The way depends on the triangles alone.
+//!
+//! No way crosses a piece of a breakline: its closed disc is empty, so no triangle is obtuse over it. So a lake with a closed shore stays.
+
+use crate::plan::job_plan::Plan;
+use delaunay::geometry::Site;
+
+/// An edge is long from this many times the mean spacing of all points on.
+const SPACINGS: u128 = 10;
+
+/// The rule of a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HullRule {
+    /// The square of the longest edge that no triangle flows over, in square lattice steps.
+    limit: u64,
+}
+
+impl HullRule {
+    /// Returns the rule of a job. It follows from what headers tell, so every step knows it, whatever the parts and tiles.
+    pub fn of(plan: &Plan) -> HullRule {
+        HullRule::of_points(plan.records, plan.claimed_area)
+    }
+
+    /// Returns the rule where so many points share an `area` in square lattice steps. No two of them that stay are nearer than a step.
+    fn of_points(points: u64, area: u64) -> HullRule {
+        let points = points.max(1);
+        let limit = SPACINGS * SPACINGS * u128::from(area.max(points)) / u128::from(points);
+        HullRule { limit: u64::try_from(limit).unwrap_or(u64::MAX) }
+    }
+
+    /// Returns the longest edge that no triangle flows over, in lattice steps.
+    pub fn length(&self) -> f64 {
+        (self.limit as f64).sqrt()
+    }
+
+    /// Tells whether a triangle may flow over the edge from `a` to `b`.
+    #[inline]
+    pub fn is_long(&self, a: Site, b: Site) -> bool {
+        dot(a, b, b) as u64 > self.limit
+    }
+
+    /// Returns the corner at which the edge begins that the triangle flows over.
+    #[inline]
+    pub fn flow(&self, corners: [Site; 3]) -> Option<usize> {
+        let [a, b, c] = corners;
+        // Few triangles have a long edge, so the processor predicts this branch. Half of all triangles are obtuse.
+        if !(self.is_long(a, b) | self.is_long(b, c) | self.is_long(c, a)) {
+            return None;
+        }
+        let is_obtuse = |&apex: &usize| dot(corners[apex], corners[(apex + 1) % 3], corners[(apex + 2) % 3]) < 0;
+        let from = ((0..3).find(is_obtuse)? + 1) % 3;
+        self.is_long(corners[from], corners[(from + 1) % 3]).then_some(from)
+    }
+}
+
+/// Returns the dot product of the vectors from `o` to `a` and to `b`, which is below 2^62.
+#[inline]
+fn dot(o: Site, a: Site, b: Site) -> i64 {
+    (0..2).map(|k| (a[k] as i64 - o[k] as i64) * (b[k] as i64 - o[k] as i64)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use delaunay::mesh::index::HalfEdgeIndex;
+    use delaunay::triangulation::divide_and_conquer;
+    use proptest::prelude::*;
+
+    #[test]
+    fn only_obtuse_triangles_with_a_long_edge_flow() {
+        let rule = HullRule::of_points(1, 1);
+        assert_eq!(rule.flow([[0, 0], [11, 0], [5, 1]]), Some(0));
+        assert_eq!(rule.flow([[5, 1], [0, 0], [11, 0]]), Some(1));
+        assert_eq!(rule.flow([[0, 0], [10, 0], [5, 1]]), None, "not long");
+        assert_eq!(rule.flow([[0, 0], [40, 0], [20, 20]]), None, "a right angle");
+        let reach = 1 << 29;
+        assert_eq!(rule.flow([[-reach, -reach], [reach, reach], [0, -1]]), Some(0), "the greatest extent");
+    }
+
+    proptest! {
+        #[test]
+        fn a_triangle_flows_over_its_longest_edge_if_that_is_long(
+            corners in prop::array::uniform3(prop::array::uniform2(-60i32..60)),
+            limit in 0u64..20_000,
+        ) {
+            let rule = HullRule { limit };
+            let square = |from: usize| {
+                let [a, b] = [corners[from], corners[(from + 1) % 3]];
+                dot(a, b, b)
+            };
+            let (longest, sum) = (0..3).map(square).fold((0, 0), |(most, sum), s| (most.max(s), sum + s));
+            let flow = (2 * longest > sum && longest as u64 > limit).then_some(longest);
+            prop_assert_eq!(rule.flow(corners).map(square), flow);
+        }
+
+        /// Even where many sites lie on one circle, so that there are several triangulations.
+        #[test]
+        fn edges_grow_along_a_way(sites in prop::collection::btree_set(prop::array::uniform2(-30i32..30), 3..120)) {
+            let sites: Vec<Site> = sites.into_iter().collect();
+            let mesh = divide_and_conquer::triangulate(&sites).unwrap();
+            let rule = HullRule { limit: 0 };
+            let flow = |t: usize| {
+                let from = rule.flow(mesh.triangles[t].map(|v| sites[v.get()]))?;
+                Some(HalfEdgeIndex::of_triangle(t)[from])
+            };
+            let length = |h: HalfEdgeIndex| {
+                let [a, b] = [mesh.origin(h), mesh.destination(h)].map(|v| sites[v.get()]);
+                dot(a, b, b)
+            };
+            for h in (0..mesh.triangles.len()).filter_map(flow) {
+                let twin = mesh.twin(h);
+                if twin != HalfEdgeIndex::HULL && let Some(next) = flow(twin.triangle()) {
+                    prop_assert!(length(next) > length(h));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Step 4, once for each merge node of the tree: triangulates what the nodes below left pending, discards what covers ground that is
+//! final already, and finds the triangles that are final now. These are the seam.
+
+use crate::index::{NodeIndex, TileIndex};
+use crate::merge_records::{FlowQuestion, Frontier, HullCount, Seam, tiles_of};
+use crate::mesh::final_triangles::{TriangleState, find_final};
+use crate::mesh::hull_flow::{FlowsBelow, NodeMesh, flows_of_merge};
+use crate::mesh::hull_rule::HullRule;
+use crate::mesh::precision_limit::PrecisionLimit;
+use crate::partition::tree::Cell;
+use crate::plan::budget::BYTES_PER_MERGED_SITE;
+use crate::plan::job_plan::Plan;
+use crate::records::{BorderVertex, SeamTriangle, StepOutput, Store};
+use delaunay::geometry::Site;
+use delaunay::mesh::region::covered;
+use delaunay::triangulation::divide_and_conquer;
+use sys::{Error, Result, interrupt};
+
+/// Merges the frontiers `below` of merge node `node`, which decides `cell`. Returns the tiles that this finishes: those that have sites
+/// in a frontier below, and none in the frontier that goes up.
+///
+/// # Errors
+/// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be written,
+/// [`Error::Io`] on the store, [`Error::Broken`] if the frontiers contradict each other.
+pub fn merge_frontiers(
+    plan: &Plan,
+    cell: Cell,
+    below: &[(&Store, NodeIndex)],
+    store: &Store,
+    memory: u64,
+    node: NodeIndex,
+) -> Result<StepOutput<Vec<TileIndex>>> {
+    check_memory(below.iter().map(|&(store, child)| Frontier::count(store, child)).sum::<Result<u64>>()?, memory)?;
+    let (union, flows_below) = join(below)?;
+    let sites: Vec<Site> = union.iter().map(BorderVertex::plane).collect();
+    let mesh = divide_and_conquer::triangulate(&sites)?;
+    interrupt::check()?;
+    let covered = covered(&mesh, bytemuck::cast_slice(&flows_below.boundary))?;
+    interrupt::check()?;
+    let cell = cell.with_border();
+    let found = find_final(&mesh, &sites, cell.as_ref(), |triangle| covered[triangle]);
+    interrupt::check()?;
+    let node_mesh =
+        NodeMesh { mesh: &mesh, sites: &sites, found: &found, rule: HullRule::of(plan), is_root: cell.is_none() };
+    let flows = flows_of_merge(&node_mesh, &flows_below, |corners| corners.map(|v| union[v.get()].tile))?;
+    let seam: Vec<SeamTriangle> = mesh
+        .triangles
+        .iter()
+        .zip(&found.states)
+        .filter(|(_, state)| **state == TriangleState::Final)
+        .map(|(corners, _)| corners.map(|v| union[v.get()]))
+        .collect();
+    // The seam takes as much memory as the mesh.
+    drop((mesh, sites, covered));
+    let limit = PrecisionLimit::of(&plan.frame);
+    seam.iter().try_for_each(|corners| limit.check(corners.map(|corner| corner.plane())))?;
+    let hull = HullCount { slivers: flows.slivers, triangles: flows_below.triangles + seam.len() as u64 };
+    let frontier = Frontier {
+        sites: found.frontier.iter().map(|&site| union[site.get()]).collect(),
+        boundary: found.boundary,
+        passes: flows.passes,
+        questions: flows.questions,
+        triangles: hull.triangles,
+    };
+    interrupt::check()?;
+    let records = vec![Seam::new(&seam, flows.trimmed, hull).save(store, node)?, frontier.save(store, node)?];
+    let above = frontier.tiles();
+    let tiles_below = tiles_of(&union, &flows_below.questions);
+    let finished = tiles_below.into_iter().filter(|tile| above.binary_search(tile).is_err());
+    Ok(StepOutput::new(finished.collect(), records))
+}
+
+/// Joins frontiers into one. Their boundaries, and what they say of ways to the hull, come apart from their sites.
+fn join(frontiers: &[(&Store, NodeIndex)]) -> Result<(Vec<BorderVertex>, FlowsBelow)> {
+    let (mut all, mut flows) = (Vec::new(), FlowsBelow::default());
+    for &(store, node) in frontiers {
+        let Frontier { sites, boundary, passes, questions, triangles } = Frontier::load(store, node)?;
+        let (vertex, edge) = (all.len() as u32, flows.boundary.len() as u32);
+        all.extend(sites);
+        flows.boundary.extend(boundary.iter().map(|ends| ends.map(|v| v + vertex)));
+        flows.passes.extend(passes.iter().map(|pass| pass.map(|at| at + edge)));
+        flows.questions.extend(questions.iter().map(|asked| FlowQuestion { exit: asked.exit + edge, ..*asked }));
+        flows.triangles += triangles;
+    }
+    Ok((all, flows))
+}
+
+fn check_memory(sites: u64, memory: u64) -> Result<()> {
+    let needed = sites * BYTES_PER_MERGED_SITE;
+    if needed <= memory {
+        return Ok(());
+    }
+    Err(Error::Memory(format!("joining {sites} sites takes about {} MiB; raise [limits] memory", needed >> 20)))
+}

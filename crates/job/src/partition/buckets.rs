@@ -1,0 +1,162 @@
+//! Collecting points by bucket from many threads: each bucket has a buffer that is written to the point file when it is full.
+
+use crate::partition::point_file::{PointBlock, PointFile, PointFiles, PointRun};
+use points::Point;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use sys::{Error, Result};
+
+/// What one bucket holds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Bucket {
+    /// Its blocks in the point file, in no particular order.
+    pub blocks: Vec<PointBlock>,
+    /// The number of points in them.
+    pub points: u64,
+}
+
+impl Bucket {
+    /// Removes the points whose numbers in the job are in one of `orders`, which ascend. Blocks with fewer points are written
+    /// again.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] if its blocks cannot be read or written.
+    pub fn remove_records(&mut self, files: &PointFiles, orders: &[Range<u64>]) -> Result<()> {
+        let is_wanted = |point: &Point| {
+            let order = point.order();
+            let after = orders.partition_point(|range| range.start <= order);
+            after == 0 || orders[after - 1].end <= order
+        };
+        let (mut run, mut points) = (PointRun::default(), Vec::new());
+        for block in std::mem::take(&mut self.blocks) {
+            points.clear();
+            files.read(block, &mut points)?;
+            points.retain(is_wanted);
+            match points.len() {
+                0 => {}
+                kept if kept == block.points as usize => self.blocks.push(block),
+                _ => self.blocks.push(files.growing()?.append(&mut run, &points, false)?),
+            }
+        }
+        self.points = self.blocks.iter().map(|block| block.points as u64).sum();
+        Ok(())
+    }
+}
+
+/// Smaller blocks cost more system calls than their memory is worth, and more bytes, because points are packed in groups of 256.
+const LEAST_BLOCK: u64 = 64;
+/// Larger blocks take more memory and hardly less time.
+const LARGEST_BLOCK: u64 = 2048;
+/// Points are packed in pieces of this many, so that a block of whole pieces is not padded.
+const PIECE: u64 = 32;
+
+/// Buckets that several threads fill at the same time.
+pub struct Buckets<'a> {
+    /// The file that each bucket is written to; `None` if it must not get another point.
+    files: Vec<Option<&'a PointFile>>,
+    /// Points that a buffer holds.
+    capacity: usize,
+    open: Vec<Mutex<OpenBucket>>,
+}
+
+#[derive(Default)]
+struct OpenBucket {
+    buffer: Vec<Point>,
+    run: PointRun,
+    bucket: Bucket,
+}
+
+impl<'a> Buckets<'a> {
+    /// Returns `count` empty buckets in one file that together buffer at most `memory` bytes.
+    pub fn new(file: &'a PointFile, count: usize, memory: u64) -> Buckets<'a> {
+        Buckets::on(vec![Some(file); count], memory)
+    }
+
+    /// Returns an empty bucket for each of `files`, which is where it is written to. Together they buffer at most `memory` bytes. A bucket
+    /// without a file refuses points.
+    pub fn on(files: Vec<Option<&'a PointFile>>, memory: u64) -> Buckets<'a> {
+        let count = files.len();
+        let room = memory / count as u64 / size_of::<Point>() as u64;
+        let capacity = (room / PIECE * PIECE).clamp(LEAST_BLOCK, LARGEST_BLOCK) as usize;
+        Buckets { files, capacity, open: (0..count).map(|_| Mutex::default()).collect() }
+    }
+
+    /// Returns the bytes of one buffer where memory is ample.
+    pub fn largest_buffer() -> u64 {
+        LARGEST_BLOCK * size_of::<Point>() as u64
+    }
+
+    /// Adds `points`, which all belong to bucket `index`.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] if a full buffer cannot be written, [`sys::Error::NeedsOnePart`] if the bucket has no file.
+    pub fn extend(&self, index: usize, mut points: &[Point]) -> Result<()> {
+        let mut open = lock(&self.open[index]);
+        while !points.is_empty() {
+            if open.buffer.capacity() == 0 {
+                open.buffer.reserve_exact(self.capacity);
+            }
+            let (now, later) = points.split_at(points.len().min(self.capacity - open.buffer.len()));
+            open.buffer.extend_from_slice(now);
+            points = later;
+            if open.buffer.len() == self.capacity {
+                self.flush(index, &mut open, false)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn flush(&self, index: usize, open: &mut OpenBucket, is_last: bool) -> Result<()> {
+        let file = self.files[index].ok_or(Error::NeedsOnePart)?;
+        let block = file.append(&mut open.run, &open.buffer, is_last)?;
+        open.bucket.blocks.push(block);
+        open.bucket.points += block.points as u64;
+        open.buffer.clear();
+        Ok(())
+    }
+
+    /// Writes what is still in the buffers and returns the buckets.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] if a buffer cannot be written.
+    pub fn finish(self) -> Result<Vec<Bucket>> {
+        let finish = |(index, open): (usize, &Mutex<OpenBucket>)| {
+            let mut open = lock(open);
+            if !open.buffer.is_empty() {
+                self.flush(index, &mut open, true)?;
+            }
+            open.buffer = Vec::new();
+            Ok(std::mem::take(&mut open.bucket))
+        };
+        self.open.par_iter().enumerate().map(finish).collect()
+    }
+}
+
+fn lock(open: &Mutex<OpenBucket>) -> MutexGuard<'_, OpenBucket> {
+    open.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_points_of_the_given_records_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = PointFile::create(&folder.path().join("points"), 0).unwrap();
+        let buckets = Buckets::new(&file, 1, 0);
+        let points: Vec<Point> = (0..1000).map(|i| Point::new([i as i32, 0], 0, [0; 3], 0, i)).collect();
+        buckets.extend(0, &points).unwrap();
+        let mut bucket = buckets.finish().unwrap().remove(0);
+        let files = PointFiles::open(&[]).unwrap().and(file);
+        bucket.remove_records(&files, &[0..1, 64..64, 100..300, 999..2000]).unwrap();
+        let mut left = Vec::new();
+        bucket.blocks.iter().for_each(|&block| files.read(block, &mut left).unwrap());
+        let orders: Vec<u64> = left.iter().map(Point::order).collect();
+        assert_eq!(orders, (1..100).chain(300..999).collect::<Vec<u64>>());
+        assert_eq!(bucket.points, 798);
+        bucket.remove_records(&files, &[0..500, 500..1000]).unwrap();
+        assert_eq!(bucket, Bucket::default());
+    }
+}

@@ -1,0 +1,231 @@
+//! Reading the points of a job of several parts: before a part is done, the inputs that it is the first to need are read whole, and their
+//! points go to the parts that they reach, into a file for each.
+//!
+//! The part that reads inputs is called their **reader**. Its point files have its number, so every file has one writer.
+
+use crate::durable::atomic_file::create_folder;
+use crate::durable::columns::{ColumnReader, ColumnWriter};
+use crate::durable::directory::JobDirectory;
+use crate::index::PartIndex;
+use crate::partition::breakline_points::add_line_sites;
+use crate::partition::buckets::{Bucket, Buckets};
+use crate::partition::parts::Parts;
+use crate::partition::point_file::{PointBlock, PointFile, PointFiles};
+use crate::partition::read::{JudgedInputs, decode, judge};
+use crate::partition::result::{Partition, PointSummary};
+use crate::partition::tree_builder::TreeBuilder;
+use crate::plan::budget::read_buffer_memory;
+use crate::plan::job_plan::Plan;
+use crate::plan::text_inputs::{allowed_malformed, stop_at};
+use crate::progress::stage::Stage;
+use crate::records::{RecordRef, StepRecord, Store};
+use points::PointCounts;
+use points::options::OnBadFile;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sys::{Error, Result};
+
+/// What a reader found for one part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PointsForPart {
+    /// The part.
+    pub part: PartIndex,
+    /// The number of blocks.
+    blocks: u64,
+    /// Their bytes.
+    pub bytes: u64,
+}
+
+/// What the inputs of a reader held.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct ReadInputs {
+    /// Sums over these inputs.
+    pub summary: PointSummary,
+    /// What was found for each part that has points in them, by part.
+    pub by_part: Vec<PointsForPart>,
+    /// The first input that has malformed records, and what it held.
+    malformed: Option<(usize, PointCounts)>,
+}
+
+/// The blocks that a reader has written, each with the number of its bucket, by part.
+#[derive(Debug, Default)]
+pub struct ReadBlocks {
+    buckets: Vec<u32>,
+    blocks: Vec<PointBlock>,
+}
+
+impl ReadBlocks {
+    /// Writes the record of `reader`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn save(&self, store: &Store, reader: PartIndex) -> Result<RecordRef> {
+        ColumnWriter::default().push(&self.buckets).push(&self.blocks).write(store, StepRecord::Read(reader))
+    }
+}
+
+/// Reads the inputs that `reader` is the first to need, where `malformed` records were found before. With `sync` it waits for the disk.
+///
+/// # Errors
+/// [`Error::NeedsOnePart`] if a header is wrong or an input is bad and to be left out; [`Error::Input`] if too many records are
+/// malformed; [`Error::Io`] if an input cannot be read or a point file cannot be written.
+pub fn read_inputs(
+    plan: &Plan,
+    parts: &Parts,
+    directory: &JobDirectory,
+    reader: PartIndex,
+    malformed: u64,
+    sync: bool,
+    stage: &Stage,
+) -> Result<(ReadInputs, ReadBlocks)> {
+    let inputs = parts.new_inputs(reader);
+    let files = parts.all().map(|part| create(parts, directory, reader, part)).collect::<Result<Vec<_>>>()?;
+    let file_of = |bucket: usize| files[parts.part_of(bucket).get()].as_ref();
+    let buckets = Buckets::on((0..parts.grid.buckets()).map(file_of).collect(), read_buffer_memory(&plan.options));
+    let by_input = decode(plan, inputs.iter().copied(), malformed, &parts.grid, &buckets, stage)?;
+    let buckets = buckets.finish()?;
+    let bad = by_input.0.iter().find(|(_, summary)| summary.counts.malformed > 0);
+    let malformed = bad.map(|(input, summary)| (*input, summary.counts.clone()));
+    let JudgedInputs { summary, skipped, .. } = judge(plan, by_input)?;
+    let broken = |bounds| plan.claims.is_some_and(|claims| claims.are_broken_by(bounds, summary.counts.max_rgb));
+    if !skipped.is_empty() || summary.bounds.is_some_and(broken) {
+        return Err(Error::NeedsOnePart);
+    }
+    if sync {
+        files.iter().flatten().try_for_each(PointFile::sync)?;
+    }
+    let (mut by_part, mut read) = (Vec::new(), ReadBlocks::default());
+    for part in parts.all() {
+        let before = read.blocks.len();
+        for bucket in parts.buckets_of(part) {
+            read.blocks.extend(&buckets[bucket].blocks);
+            read.buckets.resize(read.blocks.len(), bucket as u32);
+        }
+        let blocks = &read.blocks[before..];
+        if !blocks.is_empty() {
+            let bytes = blocks.iter().map(PointBlock::bytes).sum();
+            by_part.push(PointsForPart { part, blocks: blocks.len() as u64, bytes });
+        }
+    }
+    Ok((ReadInputs { summary, by_part, malformed }, read))
+}
+
+/// Makes the reader's point file for `part` if one of its inputs reaches it.
+fn create(parts: &Parts, directory: &JobDirectory, reader: PartIndex, part: PartIndex) -> Result<Option<PointFile>> {
+    if !parts.new_inputs(reader).iter().any(|&input| parts.reaches(input, part)) {
+        return Ok(None);
+    }
+    let directory = directory.part(part);
+    create_folder(&directory.points())?;
+    PointFile::create(&directory.point_file(reader.0 as u16), reader.0 as u16).map(Some)
+}
+
+/// Checks that all inputs together have no more malformed records than they may. Each reader knows only its own.
+///
+/// # Errors
+/// [`Error::Input`] names the first file with such records.
+pub fn check_malformed<'a>(plan: &Plan, read: impl Iterator<Item = &'a ReadInputs> + Clone) -> Result<()> {
+    let malformed = read.clone().map(|inputs| inputs.summary.counts.malformed).sum();
+    let mut bad = read.filter_map(|inputs| inputs.malformed.as_ref());
+    let first = bad.next();
+    match first {
+        // Where bad files are left out, each is judged by itself.
+        Some((input, counts))
+            if plan.options.input.on_bad_file == OnBadFile::Stop
+                && malformed > allowed_malformed(plan.options.input.max_malformed_fraction.0, plan.records) =>
+        {
+            let others = bad.map(|(input, counts)| (&plan.inputs[*input].source, counts.malformed));
+            Err(stop_at(&plan.inputs[*input].source, counts, others, [malformed, plan.records]))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The points of a part, which all of its readers have found.
+pub struct PointsOfPart<'a> {
+    plan: &'a Plan,
+    parts: &'a Parts,
+    part: PartIndex,
+    /// The blocks, each with the number of its bucket.
+    blocks: Vec<(u32, PointBlock)>,
+}
+
+impl<'a> PointsOfPart<'a> {
+    /// Returns no points of `part`.
+    pub fn none(plan: &'a Plan, parts: &'a Parts, part: PartIndex) -> PointsOfPart<'a> {
+        PointsOfPart { plan, parts, part, blocks: Vec::new() }
+    }
+
+    /// Adds what `reader` has found for the part, with the store of the reader.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on the store.
+    pub fn add(&mut self, reader: PartIndex, store: &Store, read: &ReadInputs) -> Result<()> {
+        let mut first = 0;
+        let own = read.by_part.iter().find(|found| {
+            let is_own = found.part == self.part;
+            first += if is_own { 0 } else { found.blocks as usize };
+            is_own
+        });
+        let Some(own) = own else { return Ok(()) };
+        let key = StepRecord::Read(reader);
+        let buckets = ColumnReader::open(store, key)?.column_part::<u32>(first, own.blocks as usize)?;
+        let mut columns = ColumnReader::open(store, key)?;
+        columns.skip_column::<u32>()?;
+        let blocks = columns.column_part::<PointBlock>(first, own.blocks as usize)?;
+        self.blocks.extend(buckets.iter().copied().zip(blocks.iter().copied()));
+        Ok(())
+    }
+
+    /// Tells whether the files of the part in `directory` hold what was written to them.
+    pub fn are_whole(&self, directory: &JobDirectory) -> bool {
+        let files = directory.point_files().and_then(|files| PointFiles::open(&files));
+        self.blocks.is_empty()
+            || files.is_ok_and(|files| self.blocks.par_iter().all(|(_, block)| files.is_whole(*block)))
+    }
+
+    /// Cuts the part into tiles. `directory` is that of the part.
+    ///
+    /// # Errors
+    /// [`Error::Io`] on its point files, [`Error::Config`] if it would have too many tiles.
+    pub fn partition(self, directory: &JobDirectory) -> Result<Partition> {
+        let PointsOfPart { plan, parts, part, .. } = self;
+        // Crowded buckets are divided again into a file that no reader writes.
+        let own = parts.all().len() as u16;
+        let mut found = directory.point_files()?;
+        found.retain(|(number, _)| *number != own);
+        create_folder(&directory.points())?;
+        let files = PointFiles::open(&found)?.and(PointFile::create(&directory.point_file(own), own)?);
+        let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
+        let mut builder = TreeBuilder::repeatable(&files, max_points_per_tile, read_buffer_memory(&plan.options));
+        let read_bytes: u64 = self.blocks.iter().map(|(_, block)| block.bytes()).sum();
+        let mut buckets = vec![Bucket::default(); parts.grid.buckets()];
+        for (index, block) in self.blocks {
+            let bucket = &mut buckets[index as usize];
+            bucket.points += u64::from(block.points);
+            bucket.blocks.push(block);
+        }
+        let max_rgb = plan.claims.map_or(0, |claims| claims.max_rgb);
+        let sites = Buckets::new(files.growing()?, parts.grid.buckets(), read_buffer_memory(&plan.options));
+        add_line_sites(plan, max_rgb, &parts.grid, &sites, |bucket| parts.part_of(bucket) == part)?;
+        for (bucket, sites) in buckets.iter_mut().zip(sites.finish()?) {
+            bucket.points += sites.points;
+            bucket.blocks.extend(sites.blocks);
+        }
+        let mut summary = PointSummary::default();
+        summary.counts.kept = buckets.iter().map(|bucket| bucket.points).sum();
+        builder.grow_root(part, parts.cell(part), &parts.grid, parts.span(part), buckets)?;
+        let (tree, blocks) = builder.finish();
+        if tree.nodes.len() > PartIndex::STRIDE {
+            return Err(Error::Config(format!(
+                "a part of {} points has {} tiles, more than the {} that can be numbered: set a greater [triangulation] \
+                 max_points_per_tile",
+                summary.counts.kept,
+                tree.leaves.len(),
+                PartIndex::STRIDE / 2
+            )));
+        }
+        let point_bytes = read_bytes + files.growing()?.bytes();
+        Ok(Partition { tree, blocks, summary, point_bytes, skipped: Vec::new() })
+    }
+}

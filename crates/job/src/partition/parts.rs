@@ -1,0 +1,159 @@
+//! The parts of a job: the plane is cut along the buckets of the grid into cells of about the wanted number of points, as far as the
+//! headers tell. So a part is complete as soon as every input whose box meets its cell has been read ("spatial finalization", Isenburg
+//! et al. 2006, "Streaming Computation of Delaunay Triangulations"). What a part really holds decides only how its own tree is cut.
+
+use crate::index::{NodeIndex, PartIndex};
+use crate::partition::grid::{Grid, GridSpan, GridSums};
+use crate::partition::tree::{Cell, NodeKind, Tree, TreeNode};
+use crate::partition::tree_builder::wanted_buckets;
+use crate::plan::job_plan::{Plan, PlannedInput};
+use delaunay::geometry::Bounds;
+
+/// The parts of a job. They depend on its plan alone.
+pub struct Parts {
+    /// The buckets that points are sorted into while they are read. A bucket belongs to one part.
+    pub grid: Grid,
+    /// The tree above the parts. Its leaves are the parts, in the order in which they are done.
+    pub tree: Tree,
+    spans: Vec<GridSpan>,
+    part_of: Vec<PartIndex>,
+    /// The buckets that each input may have points in.
+    reach: Vec<GridSpan>,
+    /// The inputs that each part is the first to need.
+    new_inputs: Vec<Vec<usize>>,
+    /// How many points each part is expected to have.
+    expected: Vec<u64>,
+}
+
+impl Parts {
+    /// Cuts the plane for the job of `plan`.
+    pub fn of(plan: &Plan) -> Parts {
+        let triangulation = &plan.options.triangulation;
+        let grid = Grid::over(plan.extent, wanted_buckets(plan.records, triangulation.max_points_per_tile.0));
+        let reach: Vec<GridSpan> = plan.inputs.iter().map(|input| grid.span_of(input.claimed)).collect();
+        let most = if plan.is_one_part() { u64::MAX } else { points_per_part(plan) };
+        let mut cutter =
+            PartCutter { tree: Tree::default(), spans: Vec::new(), sums: expected_points(&grid, &plan.inputs), most };
+        cutter.cut(Cell::PLANE, None, grid.span());
+        let PartCutter { mut tree, spans, sums, .. } = cutter;
+        let expected = spans.iter().map(|&span| sums.points(span)).collect();
+        // The nodes above the parts have numbers of their own.
+        tree.part = PartIndex::new(spans.len());
+        let mut part_of = vec![PartIndex::FIRST; grid.buckets()];
+        for (part, &span) in spans.iter().enumerate() {
+            grid.in_span(span).for_each(|bucket| part_of[bucket] = PartIndex::new(part));
+        }
+        let mut new_inputs = vec![Vec::new(); spans.len()];
+        for (input, reach) in reach.iter().enumerate() {
+            // Every bucket belongs to a part.
+            let first = spans.iter().position(|span| reach.meets(*span)).unwrap_or(0);
+            new_inputs[first].push(input);
+        }
+        Parts { grid, tree, spans, part_of, reach, new_inputs, expected }
+    }
+
+    /// Returns the plan of a job that is one part if nothing can be cut: many small inputs may share one area.
+    pub fn cut_or_whole(plan: Plan) -> Plan {
+        let is_cut = !plan.is_one_part() && Parts::of(&plan).all().len() > 1;
+        Plan { claims: plan.claims.filter(|_| is_cut), ..plan }
+    }
+
+    /// Returns all parts in the order in which they are done.
+    pub fn all(&self) -> impl ExactSizeIterator<Item = PartIndex> + Clone {
+        (0..self.spans.len()).map(PartIndex::new)
+    }
+
+    /// Returns the node of a part in the tree above the parts.
+    pub fn node(&self, part: PartIndex) -> NodeIndex {
+        self.tree.leaves[part.get()]
+    }
+
+    /// Returns the part of the plane that `part` decides.
+    pub fn cell(&self, part: PartIndex) -> Cell {
+        self.tree.node(self.node(part)).cell
+    }
+
+    /// Returns the buckets of `part`.
+    pub fn span(&self, part: PartIndex) -> GridSpan {
+        self.spans[part.get()]
+    }
+
+    /// Returns the buckets of `part`.
+    pub fn buckets_of(&self, part: PartIndex) -> impl Iterator<Item = usize> {
+        self.grid.in_span(self.span(part))
+    }
+
+    /// Tells whether an input may have points in `part`.
+    pub fn reaches(&self, input: usize, part: PartIndex) -> bool {
+        self.reach[input].meets(self.span(part))
+    }
+
+    /// Returns the parts that read inputs which may have points in `part`.
+    pub fn readers_of(&self, part: PartIndex) -> impl Iterator<Item = PartIndex> {
+        // Later parts are the first to need only inputs that do not reach this one.
+        let reaches = move |reader: &PartIndex| self.new_inputs(*reader).iter().any(|&input| self.reaches(input, part));
+        self.all().take(part.get() + 1).filter(reaches)
+    }
+
+    /// Returns how many points `part` is expected to have.
+    pub fn expected_points(&self, part: PartIndex) -> u64 {
+        self.expected[part.get()]
+    }
+
+    /// Returns the part that a bucket belongs to.
+    pub fn part_of(&self, bucket: usize) -> PartIndex {
+        self.part_of[bucket]
+    }
+
+    /// Returns the inputs that may have points in `part` and in none of the parts before it.
+    pub fn new_inputs(&self, part: PartIndex) -> &[usize] {
+        &self.new_inputs[part.get()]
+    }
+}
+
+/// Returns about how many points a part is to have. Numbers of tiles leave room for a limited number of parts.
+fn points_per_part(plan: &Plan) -> u64 {
+    plan.options.triangulation.max_points_per_part.0.max(plan.records.div_ceil(PartIndex::MOST as u64 / 2))
+}
+
+/// Returns how many points the buckets hold if the points of each input are spread evenly over its box.
+fn expected_points(grid: &Grid, inputs: &[PlannedInput]) -> GridSums {
+    let mut points = vec![0u64; grid.buckets()];
+    for input in inputs {
+        let area = |bounds: Bounds<2>| [0, 1].map(|axis| bounds.extent(axis) as u128 + 1).iter().product::<u128>();
+        let whole = area(input.claimed);
+        let records = u128::from(input.decoded_records());
+        for (bucket, shared) in grid.shared_with(input.claimed) {
+            points[bucket] += (records * area(shared) / whole) as u64;
+        }
+    }
+    GridSums::new(*grid, points.into_iter())
+}
+
+struct PartCutter {
+    tree: Tree,
+    spans: Vec<GridSpan>,
+    sums: GridSums,
+    /// The most points that a part is expected to have.
+    most: u64,
+}
+
+impl PartCutter {
+    fn cut(&mut self, cell: Cell, parent: Option<NodeIndex>, span: GridSpan) -> NodeIndex {
+        let node = NodeIndex::new(self.tree.nodes.len());
+        let halves = if self.sums.points(span) > self.most { self.sums.halve(span, cell) } else { None };
+        let leaf = NodeKind::Leaf(PartIndex::new(self.spans.len()).tile(0));
+        self.tree.nodes.push(TreeNode { cell, parent, kind: leaf });
+        match halves {
+            None => {
+                self.tree.leaves.push(node);
+                self.spans.push(span);
+            }
+            Some(halves) => {
+                let children = halves.map(|(half, half_cell)| self.cut(half_cell, Some(node), half));
+                self.tree.nodes[node.get()].kind = NodeKind::Inner(children);
+            }
+        }
+        node
+    }
+}

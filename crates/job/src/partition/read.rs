@@ -1,0 +1,218 @@
+//! Reading the points: every input is decoded once, and its points go to the buckets of a grid, from which the tree is grown.
+
+use crate::durable::directory::JobDirectory;
+use crate::index::PartIndex;
+use crate::partition::breakline_points::{BreaklineFilter, add_line_sites};
+use crate::partition::bucket_sorter::BucketSorter;
+use crate::partition::buckets::Buckets;
+use crate::partition::grid::Grid;
+use crate::partition::point_file::{PointFile, PointFiles};
+use crate::partition::result::{Partition, PointSummary};
+use crate::partition::tree::Cell;
+use crate::partition::tree_builder::{TreeBuilder, wanted_buckets};
+use crate::plan::budget::{network_memory, read_buffer_memory};
+use crate::plan::doubtful_heights::unannounced_nodata;
+use crate::plan::job_plan::{Plan, PlannedInput, SkippedInput};
+use crate::plan::stray_heights::unforeseen_heights;
+use crate::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
+use crate::progress::stage::Stage;
+use breaklines::Breaklines;
+use points::options::OnBadFile;
+use points::surface::SurfaceShares;
+use points::surface_doubts::no_ground;
+use points::{Point, PointCounts, set_network_memory};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+use sys::{Error, Result, interrupt};
+
+/// Reads all inputs of the plan: leaves the points in the job directory and returns what later steps need to know of them.
+///
+/// # Errors
+/// [`sys::Error::Input`] if too many records are malformed and bad files must not be left out, [`sys::Error::Io`] if an input cannot be
+/// read or the point file cannot be written.
+pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Result<Partition> {
+    let files = PointFiles::open(&[])?.and(PointFile::create(&directory.point_file(0), 0)?);
+    let file = files.growing()?;
+    let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
+    let memory = read_buffer_memory(&plan.options);
+    let grid = Grid::over(plan.extent, wanted_buckets(plan.records, max_points_per_tile));
+    let buckets = Buckets::new(file, grid.buckets(), memory);
+    let by_input = decode(plan, 0..plan.inputs.len(), 0, &grid, &buckets, stage)?;
+    let JudgedInputs { mut summary, skipped, orders } = judge(plan, by_input)?;
+    // Lines alone are no terrain.
+    if let Some(points) = summary.bounds {
+        add_line_sites(plan, summary.counts.max_rgb, &grid, &buckets, |_| true)?;
+        summary.bounds = Some(plan.with_lines(points));
+    }
+    let mut buckets = buckets.finish()?;
+    if !orders.is_empty() {
+        buckets.par_iter_mut().try_for_each(|bucket| bucket.remove_records(&files, &orders))?;
+    }
+    let mut builder = TreeBuilder::new(&files, max_points_per_tile, memory);
+    if summary.counts.kept > 0 {
+        builder.grow_root(PartIndex::FIRST, Cell::PLANE, &grid, grid.span(), buckets)?;
+    }
+    let (tree, blocks) = builder.finish();
+    Ok(Partition { tree, blocks, summary, point_bytes: file.bytes(), skipped })
+}
+
+/// What the inputs held, apart from those that are to be left out.
+pub(crate) struct JudgedInputs {
+    pub(crate) summary: PointSummary,
+    pub(crate) skipped: Vec<SkippedInput>,
+    /// The numbers of the records of those left out.
+    pub(crate) orders: Vec<Range<u64>>,
+}
+
+/// Sums up the inputs. Each is judged by itself, so the others have no say in whether it is left out.
+///
+/// # Errors
+/// [`Error::Input`] if the points of one show that its header hides nodata, and bad files must not be left out.
+pub(crate) fn judge(plan: &Plan, by_input: ByInput) -> Result<JudgedInputs> {
+    let options = &plan.options.input;
+    let mut judged = JudgedInputs { summary: PointSummary::default(), skipped: Vec::new(), orders: Vec::new() };
+    for (index, summary) in by_input.0 {
+        let input = &plan.inputs[index];
+        let (records, malformed) = (input.source.records, summary.counts.malformed);
+        let is_bad = malformed > allowed_malformed(options.max_malformed_fraction.0, records);
+        let is_skipped = options.on_bad_file == OnBadFile::Skip;
+        let why = unannounced_nodata(&input.source, summary.bounds, &plan.lattice, &plan.options);
+        if let Some(why) = why.as_ref().filter(|_| !is_skipped) {
+            return Err(Error::input(&input.source.path, why));
+        }
+        let too_many = || is_bad.then(|| too_many_malformed(&summary.counts, malformed, records));
+        if let Some(why) = why.or_else(too_many).filter(|_| is_skipped) {
+            judged.skipped.push(SkippedInput { file: input.source.path.clone(), why });
+            judged.orders.push(input.rules.first_order..input.rules.first_order + records);
+        } else {
+            judged.summary += with_notes(input, plan, summary);
+        }
+    }
+    Ok(judged)
+}
+
+/// Adds what the user should know about an input that only reading it shows.
+fn with_notes(input: &PlannedInput, plan: &Plan, mut summary: PointSummary) -> PointSummary {
+    let heights = unforeseen_heights(&input.source, summary.bounds, plan);
+    let counts = &mut summary.counts;
+    let path = input.source.path.display();
+    if counts.misplaced > 0 {
+        counts.notes.push(format!(
+            "{path}: {} points lie elsewhere than its octree (COPC) says, so all of its points were read to find those within bounds",
+            counts.misplaced
+        ));
+    }
+    counts.notes.extend(heights.map(|what| format!("{path}: {what}")));
+    counts
+        .notes
+        .extend(no_ground(&plan.options.input, counts).map(|what| format!("{path}: no point is left of it: {what}")));
+    summary
+}
+
+/// What each input held, in the order of the inputs. Inputs without chunks are not listed.
+#[derive(Default)]
+pub(crate) struct ByInput(pub(crate) Vec<(usize, PointSummary)>);
+
+impl ByInput {
+    /// Adds what later chunks held.
+    fn append(mut self, later: ByInput) -> ByInput {
+        let mut later = later.0.into_iter();
+        match (self.0.last_mut(), later.next()) {
+            (Some((last, summary)), Some((first, more))) if *last == first => *summary += more,
+            (_, next) => self.0.extend(next),
+        }
+        self.0.extend(later);
+        self
+    }
+}
+
+/// Decodes all chunks of these inputs in parallel and hands the points to the buckets of the grid. `malformed` records were found before.
+/// What the index of an input leaves out is decoded too if the index proves wrong.
+pub(crate) fn decode(
+    plan: &Plan,
+    inputs: impl Iterator<Item = usize>,
+    malformed: u64,
+    grid: &Grid,
+    buckets: &Buckets,
+    stage: &Stage,
+) -> Result<ByInput> {
+    let lines = plan.built_breaklines()?;
+    set_network_memory(network_memory(&plan.options));
+    let pass = Pass { plan, grid, buckets, lines: lines.as_deref(), malformed: AtomicU64::new(malformed) };
+    let mut by_input = pass.over(inputs, false, |input, chunk, sink| {
+        let counts = input.source.decode(chunk, &input.rules, sink)?;
+        stage.advance(counts.read);
+        Ok(counts)
+    })?;
+    let is_wrong = |counts: &PointCounts| counts.misplaced > 0 && counts.not_decoded > 0;
+    let wrong: Vec<usize> = by_input.0.iter().filter(|(_, s)| is_wrong(&s.counts)).map(|(index, _)| *index).collect();
+    let rest = pass
+        .over(wrong.into_iter(), true, |input, chunk, sink| input.source.decode_left_out(chunk, &input.rules, sink))?;
+    for (index, more) in rest.0 {
+        if let Some((_, summary)) = by_input.0.iter_mut().find(|(known, _)| *known == index) {
+            summary.counts.take_back_not_decoded();
+            *summary += more;
+        }
+    }
+    Ok(by_input)
+}
+
+/// One way over inputs, chunk by chunk.
+struct Pass<'a> {
+    plan: &'a Plan,
+    grid: &'a Grid,
+    buckets: &'a Buckets<'a>,
+    /// What drops points at breaklines.
+    lines: Option<&'a Breaklines>,
+    /// The malformed records so far.
+    malformed: AtomicU64,
+}
+
+/// Takes points of an input.
+type PointSink<'a> = &'a mut dyn FnMut(&[Point]) -> Result<()>;
+
+impl Pass<'_> {
+    /// Decodes all chunks of these inputs with `decode`, in parallel: what bounds leave in, or what an index leaves out.
+    fn over(
+        &self,
+        inputs: impl Iterator<Item = usize>,
+        left_out: bool,
+        decode: impl Fn(&PlannedInput, usize, PointSink) -> Result<PointCounts> + Sync,
+    ) -> Result<ByInput> {
+        let inputs: Vec<usize> = inputs.collect();
+        let read_ahead = |index: &usize| {
+            let PlannedInput { source, rules, .. } = &self.plan.inputs[*index];
+            source.read_ahead(rules.bounds.as_ref(), left_out)
+        };
+        let _ahead = inputs.iter().map(read_ahead).collect::<Result<Vec<_>>>()?;
+        let chunks_of = |index: usize| (0..self.plan.inputs[index].source.chunks()).map(move |chunk| (index, chunk));
+        let chunks: Vec<(usize, usize)> = inputs.into_iter().flat_map(chunks_of).collect();
+        let decode_chunk = |&(index, chunk): &(usize, usize)| -> Result<ByInput> {
+            interrupt::check()?;
+            let input = &self.plan.inputs[index];
+            let mut sorter = BucketSorter::new(self.grid, self.buckets);
+            let mut filter = BreaklineFilter::new(self.lines);
+            let mut counts = decode(input, chunk, &mut |points| sorter.add(filter.without_dropped(points)))?;
+            let SurfaceShares { points, ground, unclassified } = filter.dropped();
+            counts.drop_at_breaklines([points, ground, unclassified]);
+            self.check_malformed(input, &counts)?;
+            Ok(ByInput(vec![(index, PointSummary { counts, bounds: sorter.bounds() })]))
+        };
+        // The reduction keeps the order of the chunks.
+        chunks.par_iter().with_max_len(1).map(decode_chunk).try_reduce(ByInput::default, |a, b| Ok(a.append(b)))
+    }
+
+    /// Fails if there are too many malformed records. Only a chunk with some of its own reports that: another may be sound.
+    fn check_malformed(&self, input: &PlannedInput, counts: &PointCounts) -> Result<()> {
+        let (plan, options) = (self.plan, &self.plan.options.input);
+        let so_far = self.malformed.fetch_add(counts.malformed, Ordering::Relaxed) + counts.malformed;
+        let allowed = allowed_malformed(options.max_malformed_fraction.0, plan.records);
+        match options.on_bad_file {
+            OnBadFile::Stop if counts.malformed > 0 && so_far > allowed => {
+                Err(stop_at(&input.source, counts, std::iter::empty(), [so_far, plan.records]))
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! What would bring points into the area of use of their coordinate reference system: mistakes that are usual enough to be tried.
+
+use points::{Crs, CrsKind, FileFormat, Unit};
+
+/// The units in which a file may be, whatever its CRS.
+const UNITS: [Unit; 5] = [Unit::Metre, Unit::Foot, Unit::Other(Unit::KILOMETRE), Unit::Other(0.01), Unit::Other(0.001)];
+
+/// What the steps of one of several files may be wrong by.
+const SCALES: [f64; 6] = [10.0, 0.1, 100.0, 0.01, 1000.0, 0.001];
+
+/// Numbers of zones stand in front of so many metres.
+const ZONE: f64 = 1e6;
+
+/// A change of all x and y of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Change {
+    /// They are longitude and latitude already, in this order or the other one.
+    Degrees { exchanged: bool },
+    /// x and y change places.
+    Exchanged,
+    /// They are multiplied by this.
+    Scaled(f64),
+    /// The same, and they lie near the area then, as surveys beyond it do.
+    ExchangedNearBy,
+    /// They count in this unit.
+    Unit(Unit),
+    /// This is added to them.
+    Moved([f64; 2]),
+    /// These have the other sign.
+    Negated([bool; 2]),
+}
+
+/// Returns the changes that bring one of several files to the others, if one does.
+pub(crate) fn scales() -> impl Iterator<Item = Change> {
+    SCALES.into_iter().map(Change::Scaled)
+}
+
+/// Returns the changes of a place of a file in `crs` that are worth a try, the most usual first.
+pub(crate) fn changes([x, y]: [f64; 2], crs: &Crs) -> Vec<Change> {
+    let signs = [[true, false], [false, true], [true, true]].map(Change::Negated);
+    let Some(metres) = crs.metres_per_unit().filter(|_| crs.kind != CrsKind::Geographic) else {
+        return [Change::Exchanged].into_iter().chain(signs).collect();
+    };
+    // Such numbers fit nearly everything that is added to them.
+    if x.abs() <= 360.0 && y.abs() <= 360.0 {
+        return [false, true].map(|exchanged| Change::Degrees { exchanged }).into();
+    }
+    let units = UNITS.map(Change::Unit);
+    let moved = moves([x, y], crs, metres).into_iter().filter(|by| *by != [0.0; 2]).map(Change::Moved);
+    [Change::Exchanged].into_iter().chain(units).chain([Change::ExchangedNearBy]).chain(moved).chain(signs).collect()
+}
+
+/// Returns what the number of a zone or a false origin may be, if it is too much or missing.
+fn moves(place: [f64; 2], crs: &Crs, metres: f64) -> Vec<[f64; 2]> {
+    let zones = |value: f64| (value / ZONE).trunc() * ZONE;
+    let form = crs.form();
+    let projection = form.as_ref().and_then(|form| form.projection());
+    let meridian = projection.map_or(0.0, |projection| projection.value("lon_0"));
+    let origin =
+        projection.map(|projection| projection.false_origin()).unwrap_or_default().map(|length| length / metres);
+    // Other eastings of some million metres have no number in front.
+    let is_number = |value: f64| numbers_of_zone(meridian).contains(&value);
+    let in_front = |value: f64| if is_number(zones(value) / ZONE) { -zones(value) } else { 0.0 };
+    let (x, y) = (in_front(place[0]), -zones(place[1]));
+    // A false origin of both that begins with whole millions.
+    let of_both = if y == 0.0 { [x, y] } else { [-zones(place[0]), y] };
+    let [east, north] = origin;
+    let [zone_east, zone_north] = origin.map(zones);
+    vec![[x, 0.0], [0.0, north], [east, 0.0], [east, north], [zone_east, 0.0], [zone_east, zone_north], of_both]
+}
+
+/// Returns the numbers of a zone with this central meridian: of 6 degrees as UTM counts them and as from Greenwich, and of 3 degrees.
+fn numbers_of_zone(meridian: f64) -> [f64; 3] {
+    [(meridian + 183.0) / 6.0, (meridian + 3.0) / 6.0, meridian / 3.0]
+}
+
+impl Change {
+    /// Returns where a place of a file in `crs` lies with the change.
+    pub(crate) fn apply(&self, [x, y]: [f64; 2], crs: &Crs) -> Option<[f64; 2]> {
+        let signed = |value: f64, is_negated: bool| if is_negated { -value } else { value };
+        Some(match self {
+            Change::Degrees { exchanged: false } => [x, y],
+            Change::Degrees { exchanged: true } | Change::Exchanged | Change::ExchangedNearBy => [y, x],
+            Change::Scaled(factor) => [x * factor, y * factor],
+            Change::Unit(unit) => {
+                let factor = unit.metres_per_unit()? / crs.metres_per_unit()?;
+                [x * factor, y * factor]
+            }
+            Change::Moved([east, north]) => [x + east, y + north],
+            Change::Negated([of_x, of_y]) => [signed(x, *of_x), signed(y, *of_y)],
+        })
+    }
+
+    /// Returns whether the changed places are longitudes and latitudes.
+    pub(crate) fn is_in_degrees(&self) -> bool {
+        matches!(self, Change::Degrees { .. })
+    }
+
+    /// Says what to do about a file of this format.
+    pub(crate) fn cure(&self, format: FileFormat) -> String {
+        let is_text = format == FileFormat::Text;
+        match self {
+            Change::Degrees { exchanged } => degrees(*exchanged, is_text),
+            Change::Exchanged => format!("With x and y exchanged, they lie within it: {}", exchange(is_text)),
+            Change::ExchangedNearBy => format!("With x and y exchanged, they lie near it: {}", exchange(is_text)),
+            Change::Scaled(factor) => format!(
+                "Multiplied by {factor}, they lie beside those of the other files: {}, or leave the file out of [input] files",
+                if is_text {
+                    "the decimal point or the unit of the file is wrong. Multiply its x, y and z first"
+                } else {
+                    "the scale factors in the header of the file are wrong. Correct them first"
+                }
+            ),
+            Change::Unit(unit) => {
+                format!("In the unit {}, they lie within it: name a CRS in that unit with [input] crs", unit.name())
+            }
+            Change::Moved(by) => format!(
+                "With {}, they lie within it: the number of a zone or a false origin is missing or too much. Name the CRS that counts as \
+                 the file does with [input] crs, or move the points first",
+                moved(*by)
+            ),
+            Change::Negated(signs) => format!(
+                "With the sign of {} changed, they lie within it: change it first, or say with [input] crs what the points are in",
+                match signs {
+                    [true, true] => "x and y",
+                    [true, false] => "x",
+                    _ => "y",
+                }
+            ),
+        }
+    }
+}
+
+/// Says how x and y are exchanged.
+fn exchange(is_text: bool) -> &'static str {
+    if is_text {
+        return "say with columns under [input.csv] which column is which, such as columns = [\"y\", \"x\", \"z\"]";
+    }
+    "exchange them first, for example with `pdal translate in.laz out.laz --writers.las.forward=scale --writers.las.offset_x=auto \
+     --writers.las.offset_y=auto transformation --filters.transformation.matrix=\"0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1\"`"
+}
+
+/// Says what to do about longitudes and latitudes under a map.
+fn degrees(exchanged: bool, is_text: bool) -> String {
+    let order = match (exchanged, is_text) {
+        (false, _) => "",
+        (true, true) => " Latitude comes first: say so with columns = [\"y\", \"x\", \"z\"] under [input.csv].",
+        (true, false) => " Latitude comes first: exchange x and y first.",
+    };
+    format!(
+        "As longitude and latitude, they lie within it: [input] crs = \"EPSG:4326\" says so, and to_crs = \"utm\" transforms them.{order} If \
+         they are a site's own grid, crs = \"none\" takes them as a plane"
+    )
+}
+
+/// Says what is added to x and y.
+fn moved(by: [f64; 2]) -> String {
+    let one = |(by, axis): (f64, &str)| match by {
+        more if more > 0.0 => Some(format!("{more} added to {axis}")),
+        less if less < 0.0 => Some(format!("{} subtracted from {axis}", -less)),
+        _ => None,
+    };
+    by.into_iter().zip(["x", "y"]).filter_map(one).collect::<Vec<_>>().join(" and ")
+}

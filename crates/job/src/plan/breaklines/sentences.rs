@@ -1,0 +1,146 @@
+//! What a user should know about breaklines.
+
+use breaklines::{BreaklineOptions, Disagreement, FeatureId, Findings, InLake, Rise, Uneven};
+use delaunay::geometry::Site;
+use lattice::Lattice;
+use points::lines::LineFile;
+
+/// Returns the warnings about what cutting the lines of `files` with these `options` has shown. `outside` features lie outside the box of the
+/// points.
+pub(super) fn sentences(
+    files: &[LineFile],
+    lattice: &Lattice,
+    options: &BreaklineOptions,
+    findings: &Findings,
+    outside: u64,
+) -> Vec<String> {
+    let names = Names { files, lattice, findings };
+    let mut found = Vec::new();
+    if findings.subsegments == 0 {
+        found.push(names.nothing(options, outside));
+    }
+    found.extend(findings.worst_in_lakes.first().map(|worst| names.in_lake(worst)));
+    found.extend(findings.worst_disagreements.first().map(|worst| names.disagreement(worst)));
+    found.extend(findings.worst_rises.first().map(|worst| names.rise(worst)));
+    found.extend(findings.worst_uneven.first().map(|worst| names.uneven(worst)));
+    if findings.empty_paths > 0 {
+        found.push(format!(
+            "[[breaklines]]: {} parts of features are left out: lines shorter than a step of the lattice, outlines without three places on it, or \
+             lakes that a hole covers there",
+            findings.empty_paths
+        ));
+    }
+    if findings.rivers_without_heights > 0 {
+        found.push(format!(
+            "[[breaklines]]: {} rivers take their heights from the points around; whether they rise is not looked at",
+            findings.rivers_without_heights
+        ));
+    }
+    if findings.places_not_compared > 0 {
+        found.push(format!(
+            "[[breaklines]]: at {} places a line with heights meets one that takes them from the points around; whether these disagree is not \
+             looked at",
+            findings.places_not_compared
+        ));
+    }
+    found
+}
+
+struct Names<'a> {
+    files: &'a [LineFile],
+    lattice: &'a Lattice,
+    findings: &'a Findings,
+}
+
+impl Names<'_> {
+    /// Says why there are no breaklines.
+    fn nothing(&self, options: &BreaklineOptions, outside: u64) -> String {
+        let features: u64 = self.files.iter().map(|file| file.features.len() as u64).sum();
+        let why = if features == 0 {
+            "the files have no feature that is used".into()
+        } else if self.findings.segments == 0 && self.findings.empty_paths > 0 && outside < features {
+            "what lies in the box of the points is smaller than a step of the lattice".into()
+        } else if self.findings.segments == 0 {
+            format!(
+                "none of {features} features reaches into the box of the points ({outside} are far from it): look at their CRS"
+            )
+        } else {
+            let floor = self.length(options.floor.into());
+            format!(
+                "what lies in the box of the points is shorter than {floor}, and lines that are so near to each other become one: set a smaller spacing"
+            )
+        };
+        format!("[[breaklines]]: there are no breaklines: {why}")
+    }
+
+    fn in_lake(&self, &InLake { id, lake, length, place }: &InLake) -> String {
+        format!(
+            "[[breaklines]]: parts of lines or shores lie inside a lake, which is flat, and are left out; the worst is {}: about {} of it lie in \
+             {}, for example at {}; where it is to stay, cut it out of the lake as an island",
+            self.feature(id),
+            self.length(length),
+            self.feature(lake),
+            self.at(place)
+        )
+    }
+
+    fn disagreement(&self, &Disagreement { place, kept, other }: &Disagreement) -> String {
+        format!(
+            "[[breaklines]]: heights disagree at {} places where lines meet; the worst is {}: {} has the height {}, which is taken (that \
+             of a lake before a river before a line, and the lowest of the same kind), and {} has {}",
+            self.findings.disagreements,
+            self.at(place),
+            self.feature(kept.0),
+            self.height(kept.1),
+            self.feature(other.0),
+            self.height(other.1)
+        )
+    }
+
+    fn rise(&self, &Rise { id, place, steps }: &Rise) -> String {
+        format!(
+            "[[breaklines]]: {} rivers rise on their way down; the worst is {}, by {} at {}; its heights are kept as they are",
+            self.findings.rising_rivers,
+            self.feature(id),
+            self.difference(i64::from(steps)),
+            self.at(place)
+        )
+    }
+
+    fn uneven(&self, &Uneven { id, lowest, highest, place }: &Uneven) -> String {
+        format!(
+            "[[breaklines]]: {} lakes are not flat; the worst is {}, which is {} higher at {} than its lowest height, {}; that is the \
+             height of all of it",
+            self.findings.uneven_lakes,
+            self.feature(id),
+            self.difference(i64::from(highest) - i64::from(lowest)),
+            self.at(place),
+            self.height(lowest)
+        )
+    }
+
+    fn feature(&self, id: FeatureId) -> String {
+        let file = self.files.get(id.file as usize).map(|file| file.path.display().to_string()).unwrap_or_default();
+        format!("feature {} of {file}", id.feature)
+    }
+
+    fn at(&self, [x, y]: Site) -> String {
+        format!("({}, {})", self.lattice.world(0, x), self.lattice.world(1, y))
+    }
+
+    fn height(&self, z: i32) -> f64 {
+        self.lattice.world(2, z)
+    }
+
+    /// A length in the plane in source units.
+    fn length(&self, steps: u64) -> String {
+        let exact = i64::try_from(steps).ok().and_then(|steps| self.lattice.resolution.checked_mul(steps.into()));
+        exact.map_or_else(|| format!("{steps} steps"), |exact| exact.normalize().to_string())
+    }
+
+    /// A difference of heights in source units. A whole number of decimal steps shows no trace of binary.
+    fn difference(&self, steps: i64) -> String {
+        let exact = self.lattice.resolution_z.checked_mul(steps.into());
+        exact.map_or_else(|| format!("{steps} steps"), |exact| exact.normalize().to_string())
+    }
+}

@@ -1,0 +1,98 @@
+//! The input files: which ones the options name, and what their headers say.
+
+use crate::plan::input_identity::place;
+use crate::plan::job_plan::SkippedInput;
+use crate::plan::named_files::files_of;
+use points::options::{InputOptions, OnBadFile};
+use points::{FileFormat, RowChoice, Source, is_url, open_chosen, remote_files};
+use rayon::prelude::*;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use sys::{Error, Result};
+
+/// What messages call the option.
+const FILES: &str = "[input] files";
+
+/// Returns the files that the options name, in their order, each once: two paths that lead to the same file count as one.
+///
+/// # Errors
+/// [`Error::Config`] if a pattern names none, [`Error::Io`] if a folder cannot be read.
+pub fn input_paths(options: &InputOptions) -> Result<Vec<PathBuf>> {
+    let (mut paths, mut known) = (Vec::new(), HashSet::new());
+    for pattern in &options.files {
+        let found = if is_url(pattern) { remote_files(pattern)? } else { files_of(pattern, FILES)? };
+        if found.is_empty() {
+            return Err(Error::Config(format!("{FILES}: {}", nothing_at(pattern))));
+        }
+        // Paths with a double slash are one path, and URLs are two.
+        paths.extend(found.into_iter().filter(|path| known.insert(place(path).into_os_string())));
+    }
+    Ok(paths)
+}
+
+fn nothing_at(pattern: &str) -> String {
+    if Path::new(pattern).is_dir() {
+        let folder = pattern.trim_end_matches('/');
+        format!("{pattern} is a directory; name the files in it, for example {folder}/*.laz")
+    } else {
+        format!("there is no file {pattern}")
+    }
+}
+
+/// Opens all inputs, for the rows of `choice` in texts. Where bad files are to be left out, returns them apart.
+///
+/// # Errors
+/// [`Error::Input`] if a file is bad and must not be left out, [`Error::Io`] if one cannot be read.
+pub fn open_all(options: &InputOptions, choice: &RowChoice) -> Result<(Vec<Source>, Vec<SkippedInput>)> {
+    let paths = input_paths(options)?;
+    let opened: Vec<Result<Source>> = paths.par_iter().map(|path| open_chosen(path, &options.csv, choice)).collect();
+    let (mut sources, mut skipped) = (Vec::with_capacity(opened.len()), Vec::new());
+    for source in opened {
+        match source {
+            Err(Error::Input { path, what }) if options.on_bad_file == OnBadFile::Skip => {
+                skipped.push(SkippedInput { file: path, why: what });
+            }
+            // A file that the system cannot read may be sound: the program must not decide to leave it out.
+            source => sources.push(source?),
+        }
+    }
+    Ok((sources, skipped))
+}
+
+/// Checks that the files hold enough of the records that they promise: all files together, or each by itself where bad files are
+/// to be left out.
+///
+/// # Errors
+/// [`Error::Input`] names the first file that holds too few.
+pub fn check_missing_records(sources: &[Source], options: &InputOptions) -> Result<()> {
+    let records = sources.iter().map(|source| source.records).sum();
+    let is_too_much = |missing: u64, records: u64| missing as f64 > options.max_malformed_fraction.0 * records as f64;
+    let lacking = match options.on_bad_file {
+        OnBadFile::Skip => sources.iter().find(|s| is_too_much(s.missing, s.records)),
+        OnBadFile::Stop if is_too_much(sources.iter().map(|s| s.missing).sum(), records) => {
+            sources.iter().find(|s| s.missing > 0)
+        }
+        OnBadFile::Stop => None,
+    };
+    match lacking {
+        Some(first) => Err(Error::input(&first.path, missing_records(first))),
+        None => Ok(()),
+    }
+}
+
+fn missing_records(Source { records, missing, format, .. }: &Source) -> String {
+    let start = format!("says that it holds {records} records, but");
+    if missing < records {
+        return format!(
+            "{start} {missing} of them are not there: the file is cut off or its header is wrong. Copy it again, or raise [input] \
+             max_malformed_fraction to use what is there"
+        );
+    }
+    let why = match format {
+        FileFormat::Laz => {
+            "the file is cut off before the end of its first compressed chunk, which cannot be read in part"
+        }
+        _ => "the file is cut off after its header, or its header is wrong",
+    };
+    format!("{start} none of them is there: {why}. Copy it again, or leave it out with [input] on_bad_file = \"skip\"")
+}

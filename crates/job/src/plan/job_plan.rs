@@ -1,0 +1,217 @@
+//! The plan of a job.
+
+use crate::durable::atomic_file::{PendingFile, write_pending};
+use crate::options::{JobOptions, KeepSteps};
+use crate::plan::breaklines::PlannedBreaklines;
+use crate::plan::input_identity::RenamedInputs;
+use crate::plan::lattice_choice::LatticeCoarsening;
+use crate::plan::missing_attributes::missing_attributes;
+use breaklines::Breaklines;
+use delaunay::geometry::Bounds;
+use delaunay_gpu::triangulation_options::MaxPointsPerPart;
+use lattice::Lattice;
+use points::{Crs, PointCounts, PointRules, Source};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use sys::{Error, Result, Warnings};
+use tiles::color::HeightRange;
+use tiles::curvature::Curvature;
+use tiles::frame::Frame;
+
+/// What a job reads and where it puts it. The plan holds everything that later steps need besides what earlier steps stored: no step
+/// reads a header again. What steps compute from it is the same on every machine, except the transforms onto the globe and the curvature
+/// where the program does not compute the projection itself. Each is computed once.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Plan {
+    /// What the user wants.
+    pub options: JobOptions,
+    /// The inputs in their order.
+    pub inputs: Vec<PlannedInput>,
+    /// The inputs that are left out because they are bad.
+    pub skipped: Vec<SkippedInput>,
+    /// The number of records in all inputs.
+    pub records: u64,
+    /// How much coarser the lattice is than the inputs ask for.
+    pub coarsening: LatticeCoarsening,
+    /// The lattice that all sites lie on.
+    pub lattice: Lattice,
+    /// The box of the inputs on the lattice as their headers claim it, within `[input] bounds`.
+    pub extent: Bounds<2>,
+    /// What a job of several parts must know before all points are read; `None` for a job of one part.
+    pub claims: Option<Claims>,
+    /// The heights that a ramp of colours spans, by a sample of the points. `None` if they are too few to tell: then the box of the points,
+    /// or what is claimed of it, decides.
+    pub heights: Option<HeightRange>,
+    /// What became of the records of a sample, the one that `heights` is from.
+    pub sample: PointCounts,
+    /// The CRS of the job.
+    pub crs: Crs,
+    /// The name of the unit of x and y.
+    pub unit: String,
+    /// The area of the box around all records in square lattice steps, as headers claim it, whatever part of it the user wants.
+    pub claimed_area: u64,
+    /// The way from the lattice to glTF, of a scene that is not bent.
+    pub frame: Frame,
+    /// How the scene follows the curve of the earth. It is found once and kept, because not all projections have the same bits on every
+    /// machine: in a job of several parts before the plan is written down, in others once the points are read.
+    #[serde(default)]
+    pub curvature: Option<Curvature>,
+    /// The breaklines; `None` without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub breaklines: Option<PlannedBreaklines>,
+    /// A sentence about a few points that stretch the area, if there are some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stretch: Option<String>,
+    /// What the user should know about the inputs. [`Plan::all_warnings`] adds what there is to know about the options.
+    pub warnings: Warnings,
+}
+
+/// An input and the rules for its points.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PlannedInput {
+    /// What its header says.
+    pub source: Source,
+    /// How its points come to the lattice, and which of them are kept.
+    pub rules: PointRules,
+    /// The lattice box of its points, as far as its header tells.
+    pub claimed: Bounds<2>,
+}
+
+impl PlannedInput {
+    /// Returns the number of records that are decoded. An index may tell that others are out of bounds.
+    pub fn decoded_records(&self) -> u64 {
+        decoded_records(&self.source, &self.rules)
+    }
+}
+
+/// Returns the number of records that are decoded of a source.
+pub(crate) fn decoded_records(source: &Source, rules: &PointRules) -> u64 {
+    source.decoded_chunks(rules.bounds.as_ref()).records
+}
+
+/// What headers and the first chunks of the inputs say of all points. All tiles have one style, so it cannot wait for the last point. If
+/// a point shows that a claim is wrong, the job starts again as one part.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Claims {
+    /// The lattice box of the points.
+    pub bounds: Bounds<3>,
+    /// The greatest red, green or blue. Only whether it exceeds 0, and 255, counts.
+    pub max_rgb: u16,
+}
+
+impl Claims {
+    /// Returns the claims with the sites of lines within `bounds`.
+    pub(crate) fn with_lines(self, bounds: Option<Bounds<3>>) -> Claims {
+        Claims { bounds: bounds.map_or(self.bounds, |bounds| bounds.union(self.bounds)), ..self }
+    }
+
+    /// Tells whether points within `bounds`, of which `max_rgb` is the greatest colour, contradict the claims.
+    pub fn are_broken_by(&self, bounds: Bounds<3>, max_rgb: u16) -> bool {
+        self.bounds.union(bounds) != self.bounds || range_of_colors(max_rgb) > range_of_colors(self.max_rgb)
+    }
+}
+
+/// Returns 0 for no colours, 1 for colours of eight bits, 2 for longer ones.
+fn range_of_colors(max_rgb: u16) -> u8 {
+    match max_rgb {
+        0 => 0,
+        1..=255 => 1,
+        _ => 2,
+    }
+}
+
+/// An input that is left out because it is bad.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SkippedInput {
+    /// The file.
+    #[serde(with = "sys::path_text")]
+    pub file: PathBuf,
+    /// What is wrong with it.
+    pub why: String,
+}
+
+impl SkippedInput {
+    /// Calls the input what it is called by now.
+    pub(crate) fn rename(&mut self, renamed: &RenamedInputs) {
+        renamed.rename(&mut self.file);
+        renamed.rename_in(&mut self.why);
+    }
+}
+
+impl Plan {
+    /// Tells whether the job is one part.
+    pub fn is_one_part(&self) -> bool {
+        self.claims.is_none()
+    }
+
+    /// Returns the breaklines; `None` without any.
+    ///
+    /// # Errors
+    /// Those of [`PlannedBreaklines::built`].
+    pub fn built_breaklines(&self) -> Result<Option<Arc<Breaklines>>> {
+        self.breaklines.as_ref().map(PlannedBreaklines::built).transpose()
+    }
+
+    /// Tells whether a point that both plans read comes to the same place, or is dropped, in both.
+    pub(crate) fn reads_like(&self, other: &Plan) -> bool {
+        let [own, others] = [self, other].map(|plan| plan.breaklines.as_ref().map(PlannedBreaklines::cut_from));
+        self.lattice == other.lattice && own == others
+    }
+
+    /// Returns the box of all that the mesh has, of which the kept points have `points`.
+    pub fn with_lines(&self, points: Bounds<3>) -> Bounds<3> {
+        let lines = self.breaklines.as_ref().and_then(|lines| lines.bounds);
+        lines.map_or(points, |lines| lines.union(points))
+    }
+
+    /// Returns what the user should know about the options and the inputs.
+    pub fn all_warnings(&self) -> Warnings {
+        let mut warnings = self.options.warnings.clone();
+        warnings.extend(self.warnings.clone());
+        let sources = self.inputs.iter().map(|input| &input.source);
+        warnings.extend(missing_attributes(sources, self.options.output.attributes));
+        warnings.extend(self.freed_steps());
+        warnings
+    }
+
+    /// Says that a job of several parts does not keep its steps, if the user wants it to.
+    fn freed_steps(&self) -> Option<String> {
+        let is_wanted = self.options.limits.keep_steps == KeepSteps::Always;
+        (is_wanted && !self.is_one_part()).then(|| {
+            let points = self.inputs.iter().map(PlannedInput::decoded_records).sum();
+            format!(
+                "[limits] keep_steps = true has no effect in a job of several parts: they free their steps, and with another style the \
+                 job starts over; with [triangulation] max_points_per_part = {} or more the job is one part and keeps them, but it takes \
+                 more disk (gdt-batch check says how much)",
+                MaxPointsPerPart::for_one_part(points).0
+            )
+        })
+    }
+
+    /// Calls the inputs what they are called by now.
+    pub(crate) fn rename_inputs(&mut self, renamed: &RenamedInputs) {
+        self.inputs.iter_mut().for_each(|input| renamed.rename(&mut input.source.path));
+        self.skipped.iter_mut().for_each(|skipped| skipped.rename(renamed));
+        self.breaklines.iter_mut().flat_map(|lines| &mut lines.files).for_each(|file| renamed.rename(file));
+        self.warnings.iter_mut().for_each(|warning| renamed.rename_in(warning));
+    }
+
+    /// Writes the plan as the pending file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if writing fails.
+    pub fn write(&self, path: &Path) -> Result<PendingFile> {
+        let text = serde_json::to_vec(self).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
+        write_pending(path, &text)
+    }
+
+    /// Reads the plan in the file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, [`Error::Broken`] if it holds no plan.
+    pub fn read(path: &Path) -> Result<Plan> {
+        let text = std::fs::read(path).map_err(Error::io("read", path))?;
+        serde_json::from_slice(&text).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))
+    }
+}

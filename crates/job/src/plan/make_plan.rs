@@ -1,0 +1,386 @@
+//! Making the plan: looking at every input, and choosing the lattice, unit and CRS that all of them share.
+
+use crate::options::JobOptions;
+use crate::plan::area_check::{CommonPlace, check_places};
+use crate::plan::area_hint::AreaHint;
+use crate::plan::breaklines::line_files::LineFiles;
+use crate::plan::breaklines::{CloudOfPlan, PlannedBreaklines, SystemOfPoints};
+use crate::plan::budget::network_memory;
+use crate::plan::common_crs::{common_crs, horizontal_unit};
+use crate::plan::doubtful_heights::check_doubtful_heights;
+use crate::plan::extent::{Extent, SourceBox, to_float};
+use crate::plan::far_points::{extent_without_outliers, farthest_file};
+use crate::plan::flat_points::flat_points;
+use crate::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of_geocentric};
+use crate::plan::height_range::HeightSample;
+use crate::plan::inputs::{check_missing_records, open_all};
+use crate::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
+use crate::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
+use crate::plan::other_unit::{refuse_other_unit, warn_of_dropped_units};
+use crate::plan::stray_heights::JobHeights;
+use crate::plan::text_inputs::{
+    check_malformed_rows, check_malformed_sample, farthest_row, refuse_degrees, refuse_missing_classes,
+    refuse_missing_returns, row_choice, wanted_fields,
+};
+use crate::plan::zero_points::refuse_zero_points;
+use delaunay::geometry::Bounds;
+use delaunay::geometry::REACH;
+use lattice::{AxisMap, Lattice, shortest_decimal};
+use points::options::{OnBadFile, UnitChoice};
+use points::surface_doubts::no_ground;
+use points::transform_sources::transform_sources;
+use points::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source, set_network_memory};
+use rayon::prelude::*;
+use rust_decimal::prelude::ToPrimitive;
+use sys::{Error, Result, Warnings};
+use tiles::color::HeightRange;
+use tiles::frame::Frame;
+
+/// A point's number in the job is kept in 40 bits.
+const MAX_RECORDS: u64 = 1 << 40;
+
+/// More warnings than this, one for each of thousands of files, would hide the others.
+const MAX_WARNINGS: usize = 50;
+
+/// Makes the plan of the job with these `options`. `coarsening` is zero unless an earlier attempt failed with [`Error::TooFine`].
+///
+/// # Errors
+/// [`Error::Config`] if there are no inputs or they do not fit together; [`Error::Input`] if one is bad and must not be left
+/// out; [`Error::NoTerrain`] if none is left; [`Error::Io`] if one cannot be read.
+pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> Result<Plan> {
+    set_network_memory(network_memory(options));
+    let (sources, skipped) = open_all(&options.input, &row_choice(options))?;
+    plan_sources(sources, skipped, options, coarsening)
+}
+
+/// Makes the plan again without the inputs that proved bad when their points were read: the plan that [`make_plan`] makes if
+/// they are not there.
+///
+/// # Errors
+/// As [`make_plan`].
+pub fn replan_without(plan: Plan, bad: &[SkippedInput]) -> Result<Plan> {
+    let is_bad = |source: &Source| bad.iter().any(|bad| bad.file == source.path);
+    let sources = plan.inputs.into_iter().map(|input| input.source).filter(|source| !is_bad(source));
+    let is_new = |bad: &&SkippedInput| !plan.skipped.contains(bad);
+    let skipped = plan.skipped.iter().chain(bad.iter().filter(is_new)).cloned();
+    let is_whole = plan.claims.is_none();
+    let again = plan_sources(sources.collect(), skipped.collect(), &plan.options, plan.coarsening)?;
+    // What was not cut into parts is not cut now.
+    Ok(Plan { claims: again.claims.filter(|_| !is_whole), ..again })
+}
+
+/// Tells whether points lie so far from all others that they are mistakes, though no header claims them: whether a plan that looks at all
+/// points leaves out more of them than the usual one, or a file with them.
+///
+/// # Errors
+/// As [`make_plan`], if there are too many of them.
+pub(crate) fn are_there_far_points(options: &JobOptions, coarsening: LatticeCoarsening) -> Result<bool> {
+    let left_out = |plan: &Plan| {
+        let points = plan.inputs.iter().map(|input| input.source.outliers()).sum::<u64>();
+        (points, plan.skipped.len())
+    };
+    let (points, files) = left_out(&make_plan(options, LatticeCoarsening { far_points: true, ..coarsening })?);
+    let leaves_files_out = options.input.on_bad_file == OnBadFile::Skip && files > 0;
+    if points == 0 && !leaves_files_out {
+        return Ok(false);
+    }
+    // The usual plan may have left out the same.
+    let (known_points, known_files) = left_out(&make_plan(options, coarsening)?);
+    Ok(points > known_points || files > known_files)
+}
+
+/// Plans a job of `sources`. If bad files are to be left out, this leaves out those that no plan can use.
+fn plan_sources(
+    mut sources: Vec<Source>,
+    mut skipped: Vec<SkippedInput>,
+    options: &JobOptions,
+    coarsening: LatticeCoarsening,
+) -> Result<Plan> {
+    loop {
+        if let (true, Some(first)) = (sources.is_empty(), skipped.first()) {
+            return Err(Error::NoTerrain(format!(
+                "no input is left: all {} are bad and left out, the first of them {}: {}",
+                skipped.len(),
+                first.file.display(),
+                first.why
+            )));
+        }
+        match try_plan(&mut sources, options, coarsening) {
+            Err(Error::Input { path, what })
+                if options.input.on_bad_file == OnBadFile::Skip && sources.iter().any(|s| s.path == path) =>
+            {
+                sources.retain(|source| source.path != path);
+                skipped.push(SkippedInput { file: path, why: what });
+            }
+            planned => {
+                let (plan, rules) = planned?;
+                let planned_input = |(source, (rules, claimed))| PlannedInput { source, rules, claimed };
+                let inputs = sources.into_iter().zip(rules).map(planned_input).collect();
+                return Ok(Plan { inputs, skipped, ..plan });
+            }
+        }
+    }
+}
+
+/// Returns a plan that does not hold the inputs yet, and the rules for the points of each, and the box that each claims.
+fn try_plan(
+    sources: &mut [Source],
+    options: &JobOptions,
+    coarsening: LatticeCoarsening,
+) -> Result<(Plan, Vec<(PointRules, Bounds<2>)>)> {
+    let mut warnings = Warnings::default();
+    sources.iter().for_each(|source| warnings.extend_from_file(&source.path, &source.warnings));
+    warnings.shorten(MAX_WARNINGS);
+    let records = sources.iter().map(|s| s.records).sum();
+    if records >= MAX_RECORDS {
+        return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
+    }
+    check_missing_records(sources, &options.input)?;
+    refuse_other_unit(sources, &options.input)?;
+    refuse_geocentric(sources, &options.input)?;
+    transform_sources(sources, &options.input, &mut warnings)?;
+    refuse_degrees(sources, &options.input)?;
+    refuse_missing_classes(sources, &options.input)?;
+    refuse_missing_returns(sources, &options.input)?;
+    let (choice, unit_choice) = said_of_sources(options);
+    let crs = common_crs(sources, choice, unit_choice, &mut warnings)?;
+    let (unit, metres) = horizontal_unit(sources, unit_choice, choice, &crs, &mut warnings)?;
+    let metres_z = crs.vertical.unwrap_or(metres);
+    warn_of_geocentric(sources, &options.input, &mut warnings);
+    warn_of_degrees(sources, &options.input, &mut warnings);
+    warn_of_dropped_units(sources, &options.input, [metres, metres_z], &mut warnings);
+    let wish = LatticeWish {
+        metres: [metres, metres_z],
+        steps: [options.input.resolution.step(), options.input.resolution_z.step()],
+        coarsening,
+    };
+    let is_known = crs.metres_per_unit().or(unit_choice.metres()).is_some();
+    let height_metres = crs.vertical.or(is_known.then_some(metres));
+    let system = SystemOfPoints { crs: &crs, height_metres, datums: options.input.datums };
+    let lines = LineFiles::read(options, &system, &mut warnings)?;
+    let mut extent = extent_without_outliers(sources, options, &wish)?;
+    lines.extend_heights(&mut extent)?;
+    let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
+    if fineness(sources, &extent, &wish).is_coarse() {
+        let row = farthest_row(sources, options, &extent)?;
+        warnings.extend(row.or_else(|| farthest_file(sources, &extent)));
+    }
+    if metres_z != metres {
+        let other = match unit_choice {
+            UnitChoice::Auto => "",
+            _ => ". [input] unit is that of x and y alone: the CRS or the columns state that of heights",
+        };
+        warnings.push(format!(
+            "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z{other}"
+        ));
+    }
+    let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;
+    let clip = options.input.bounds.map(|b| lattice_clip(&lattice, b.0));
+    let rules = point_rules(sources, options, &lattice)?;
+    check_malformed_rows(sources, &rules, options)?;
+    let (clipped, claimed_area) =
+        (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, sources, &extent, clip.is_some()));
+    let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
+    let hint = AreaHint { sources, options, extent: &extent, clipped, lattice: &lattice, wish: &wish };
+    if hint.shows_far_points(&sample) {
+        return try_plan(sources, options, LatticeCoarsening { far_points: true, ..coarsening });
+    }
+    check_malformed_sample(sources, &sample, &options.input)?;
+    refuse_zero_points(sources, &extent, &sample, &lattice)?;
+    warnings.extend(check_doubtful_heights(sources, &sample, &lattice, options, metres_z)?);
+    warnings.extend(flat_points(sources, &extent, &sample, &lattice));
+    let heights = JobHeights {
+        sources,
+        rules: &rules,
+        options,
+        lattice: &lattice,
+        extent: &extent,
+        sample: &sample,
+        metres: metres_z,
+    };
+    warnings.extend(heights.warnings()?);
+    let place = CommonPlace { crs: &crs, metres, lattice: &lattice, extent: &extent, sample: &sample };
+    check_places(sources, &place, &options.input, &mut warnings)?;
+    let stretch = hint.stretch(&sample)?;
+    warnings.extend(stretch.clone());
+    let cloud = CloudOfPlan {
+        sources,
+        rules: &rules,
+        lattice: &lattice,
+        extent: &extent,
+        clipped,
+        area: claimed_area,
+        sample: &sample.points,
+        metres: wish.metres,
+    };
+    let breaklines = PlannedBreaklines::of(&lines, options, &cloud, &mut warnings)?;
+    let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
+    let decoded: u64 = sources.iter().zip(&rules).map(|(source, rules)| decoded_records(source, rules)).sum();
+    let has_parts = !coarsening.one_part && decoded > options.triangulation.max_points_per_part.most_in_one_part();
+    let claims = has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?;
+    let lines_at = breaklines.as_ref().and_then(|lines| lines.bounds);
+    let claims = claims.map(|claims| claims.with_lines(lines_at));
+    let [low, high] = claimed_heights(&lattice, &extent).map(|z| z.round() as i32);
+    let heights = sample.range_within(HeightRange { low, high });
+    let plan = Plan {
+        claims,
+        options: options.clone(),
+        inputs: Vec::new(),
+        skipped: Vec::new(),
+        records,
+        coarsening,
+        extent: clipped,
+        lattice,
+        heights,
+        sample: PointCounts {
+            examples: Vec::new(),
+            notes: files_without_ground(&sample, options).into_iter().collect(),
+            ..sample.counts
+        },
+        crs,
+        unit: unit.into(),
+        claimed_area,
+        frame,
+        curvature: None,
+        breaklines,
+        stretch,
+        warnings,
+    };
+    Ok((plan, rules.into_iter().zip(claimed).collect()))
+}
+
+/// Returns what the user says of the coordinates of the sources. Of those that are transformed, the target says all.
+fn said_of_sources(options: &JobOptions) -> (&CrsChoice, UnitChoice) {
+    match options.input.to_crs {
+        Some(_) => (&CrsChoice::Auto, UnitChoice::Auto),
+        None => (&options.input.crs, options.input.unit),
+    }
+}
+
+/// Returns the lattice box of a source that claims the box `claim`, within `extent`. A source that claims nothing may have points
+/// everywhere.
+fn claimed_box(lattice: &Lattice, claim: &Option<SourceBox>, extent: Bounds<2>) -> Bounds<2> {
+    let Some([min, max]) = claim else { return extent };
+    let claim = Extent { min: *min, max: *max, boxes: Vec::new() };
+    let Bounds { min, max } = lattice_extent(lattice, &claim, Some(extent));
+    // Rounding may be off by a step on either side.
+    let [min, max] = [(min, -1), (max, 1)].map(|(corner, step)| corner.map(|value| value + step));
+    let within = |corner: [i32; 2]| [0, 1].map(|axis| corner[axis].clamp(extent.min[axis], extent.max[axis]));
+    Bounds { min: within(min), max: within(max) }
+}
+
+/// Returns what the sources claim of all points.
+fn claims(
+    sources: &[Source],
+    rules: &[PointRules],
+    lattice: &Lattice,
+    extent: &Extent,
+    clipped: Bounds<2>,
+) -> Result<Claims> {
+    let [low, high] = claimed_heights(lattice, extent);
+    let [low, high] = [low.floor() - 1.0, high.ceil() + 1.0].map(|z| z as i32);
+    let bounds = Bounds {
+        min: [clipped.min[0].saturating_sub(1), clipped.min[1].saturating_sub(1), low],
+        max: [clipped.max[0].saturating_add(1), clipped.max[1].saturating_add(1), high],
+    };
+    let first_colors = |(source, rules): (&Source, &PointRules)| {
+        let chunks = source.decoded_chunks(rules.bounds.as_ref());
+        if chunks.is_empty() || !rules.fields.rgb || !source.has_rgb {
+            return Ok(0);
+        }
+        source.decode(chunks.chunk(0), rules, &mut |_| Ok(())).map(|counts| counts.max_rgb)
+    };
+    let max_rgb = sources.par_iter().zip(rules).map(first_colors).try_reduce(|| 0, |a, b| Ok(a.max(b)))?;
+    Ok(Claims { bounds, max_rgb })
+}
+
+/// Returns a sentence about the files whose sample has no ground, if the job wants only that, and others have some.
+fn files_without_ground(sample: &HeightSample, options: &JobOptions) -> Option<String> {
+    let lacks_ground = |counts: &PointCounts| no_ground(&options.input, counts);
+    let mut without = sample.by_file.iter().filter_map(|(path, found)| Some((path, lacks_ground(&found.counts)?)));
+    let (path, what) = without.next().filter(|_| lacks_ground(&sample.counts).is_none())?;
+    let others = match without.count() {
+        0 => String::new(),
+        count => format!(" (and so for {count} other files)"),
+    };
+    Some(format!("{}: no point is left of it{others}: {what}", path.display()))
+}
+
+/// Returns the least and the greatest height that the sources claim, in steps of the lattice.
+fn claimed_heights(lattice: &Lattice, extent: &Extent) -> [f64; 2] {
+    let offset = lattice.offset[2].to_f64().unwrap_or(0.0);
+    [extent.min[2], extent.max[2]].map(|z| (z - offset) / to_float(lattice.step(2)))
+}
+
+/// Returns the lattice box of `bounds`, for the size of the job. Which points lie within them, their raw integers decide. It is inside out
+/// if no lattice point is.
+fn lattice_clip(lattice: &Lattice, bounds: [f64; 4]) -> Bounds<2> {
+    let [xmin, ymin, xmax, ymax] = std::array::from_fn(|i| {
+        let steps = shortest_decimal(bounds[i])
+            .and_then(|b| b.checked_sub(lattice.offset[i % 2])?.checked_div(lattice.resolution));
+        let steps = steps.map(|s| if i < 2 { s.ceil() } else { s.floor() }).and_then(|s| s.to_i64());
+        // A bound beyond all numbers is as far out as sites can lie.
+        let far = if bounds[i] < 0.0 { -(REACH as i64) } else { REACH as i64 };
+        steps.unwrap_or(far).clamp(-(REACH as i64), REACH as i64) as i32
+    });
+    Bounds { min: [xmin, ymin], max: [xmax, ymax] }
+}
+
+/// Returns the area of the box around all records in square lattice steps, whatever part of it the user wants.
+fn claimed_area(lattice: &Lattice, sources: &[Source], extent: &Extent, has_bounds: bool) -> u64 {
+    let step = lattice.resolution.to_f64().unwrap_or(1.0);
+    // The box of a text is that of the wanted rows, but its numbers are known of all.
+    let of_all = |(source, claim): (&Source, &Option<SourceBox>)| match source.format {
+        FileFormat::Text if has_bounds && source.records > 0 => Some([source.min, source.max]),
+        _ => *claim,
+    };
+    let boxes: Vec<SourceBox> = sources.iter().zip(&extent.boxes).filter_map(of_all).collect();
+    let side = |axis: usize| {
+        let low = boxes.iter().map(|[min, _]| min[axis]).fold(f64::INFINITY, f64::min);
+        let high = boxes.iter().map(|[_, max]| max[axis]).fold(f64::NEG_INFINITY, f64::max);
+        ((high - low).max(0.0) / step).round() + 1.0
+    };
+    (side(0) * side(1)) as u64
+}
+
+fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<Bounds<2>>) -> Bounds<2> {
+    let steps = |value: f64, axis: usize| {
+        let offset = lattice.offset[axis].to_f64().unwrap_or(0.0);
+        ((value - offset) / lattice.resolution.to_f64().unwrap_or(1.0)).clamp(-(REACH as f64), REACH as f64) as i32
+    };
+    let [mut min, mut max] = [extent.min, extent.max].map(|corner| [steps(corner[0], 0), steps(corner[1], 1)]);
+    if let Some(clip) = clip {
+        for axis in 0..2 {
+            min[axis] = min[axis].max(clip.min[axis]).min(clip.max[axis]);
+            max[axis] = max[axis].min(clip.max[axis]).max(min[axis]);
+        }
+    }
+    Bounds { min, max }
+}
+
+fn point_rules(sources: &[Source], options: &JobOptions, lattice: &Lattice) -> Result<Vec<PointRules>> {
+    let fields = wanted_fields(options);
+    let (classes, returns) = (options.input.kept_classes(), options.input.kept_returns());
+    let numbered = options.input.needs_numbers();
+    let mut first_order = 0;
+    let mut rules = Vec::with_capacity(sources.len());
+    for source in sources {
+        let maps = [axis_map(source, 0, lattice)?, axis_map(source, 1, lattice)?, axis_map(source, 2, lattice)?];
+        let bounds = options.input.bounds.and_then(|bounds| source.raw_bounds(bounds.0));
+        rules.push(PointRules { maps, classes, returns, bounds, first_order, numbered, fields });
+        first_order += source.records;
+    }
+    Ok(rules)
+}
+
+fn axis_map(source: &Source, axis: usize, lattice: &Lattice) -> Result<AxisMap> {
+    let Axis { offset, scale } = source.axes[axis];
+    AxisMap::new(offset, scale, lattice.offset[axis], lattice.step(axis)).ok_or_else(|| {
+        let name = ["x", "y", "z"][axis];
+        let what = format!(
+            "the {name} scale {scale} and offset {offset} have too many digits to meet the lattice exactly; rewrite the file with a \
+             decimal scale such as 0.01"
+        );
+        Error::input(&source.path, what)
+    })
+}

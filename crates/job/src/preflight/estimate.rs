@@ -1,0 +1,209 @@
+//! Estimates of the disk and the memory that a job needs.
+
+use crate::durable::directory::JobDirectory;
+use crate::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, LevelSizes};
+use crate::machine;
+use crate::options::JobOptions;
+use crate::partition::tree_builder::buffer_bytes;
+use crate::plan::budget::{BYTES_PER_LEAF_SITE, network_memory, read_buffer_memory};
+use crate::plan::job_plan::{Plan, PlannedInput};
+use crate::preflight::kept_points::{KeptPoints, has_filter};
+use crate::publish::raster::check::planned_raster;
+use crate::publish::raster::write_raster::raster_memory;
+use delaunay::geometry::Bounds;
+use points::is_url;
+use std::path::PathBuf;
+use tiles::Compression;
+use tiles::attributes::AttributeChoice;
+use tiles::color::HeightRange;
+use tiles::options::{MaxEdge, OutputFormat, OutputOptions};
+use tiles::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
+use tiles::raster::options::RasterCompression;
+
+/// Bytes that the packed point file takes for a point; 9 to 10 where points are dense.
+const BYTES_PER_POINT: u64 = 12;
+/// Bytes that the store takes for a site: its packed position, colour and class, and two triangles.
+const STORE_PER_SITE: u64 = 9 + 2 * 6;
+/// Bytes that the store takes for a site on a tile's frontier, in all records that it is in.
+const STORE_PER_BORDER_SITE: u64 = 500;
+/// Bytes of the journal and the plan of a small job, and of what the files of the store take to whole blocks of the disk.
+const OWN_FILES: u64 = 128 << 10;
+/// Bytes of a GLB besides its arrays.
+const RESULT_PER_TILE: u64 = 6000;
+/// Bytes of a file of a raster besides its cells, and of its entry in the list of files.
+const RASTER_FILE: u64 = 2000;
+/// Bytes of the preview for a pixel: its colours where neighbours have nothing in common.
+const PREVIEW_PER_PIXEL: u64 = 3;
+/// Bytes of the page that shows the terrain.
+const PAGE: u64 = 1 << 20;
+/// Bytes that a process takes before it has done anything.
+const PROCESS_MEMORY: u64 = 64 << 20;
+
+/// Bytes that an intensity takes, packed as the values of points are.
+const PACKED_INTENSITY: u64 = 2;
+
+/// Returns the bytes of results for a site: position, normal, colour, these attributes and two triangles with 16-bit corners. Quantized
+/// positions take 8 bytes, and 12 in wide tiles; normals and colours take 4 or 8 each, and few tiles have all at their widest.
+fn result_per_site(compression: Compression, attributes: AttributeChoice) -> u64 {
+    let count = u64::from(attributes.classification) + u64::from(attributes.intensity);
+    match compression {
+        Compression::None => 12 + 12 + 8 + 2 * 6 + count * 4,
+        Compression::Quantized => 12 + 8 + 4 + 2 * 6 + count * 4,
+        // What it takes for dense clouds, and half as much again for others.
+        Compression::Meshopt => 15 + count * 2,
+    }
+}
+
+/// About how many bytes a job's files take.
+pub(crate) struct DiskEstimate {
+    /// The point file and the store, as much of them as there is at one time.
+    pub(crate) temporary: u64,
+    /// The store, if nothing of it is freed.
+    store: u64,
+    /// The results.
+    pub(crate) results: u64,
+    /// The least that the disk must have for all together.
+    pub(crate) least: u64,
+}
+
+impl DiskEstimate {
+    /// Returns the estimate for the job of `plan` with at most `kept` points. A `terrain.glb` is written for up to `max_one_file`
+    /// triangles.
+    pub(crate) fn of(plan: &Plan, kept: KeptPoints, max_one_file: u64) -> DiskEstimate {
+        let (points, tiles) = (kept.0, tiles(plan, kept));
+        let options = &plan.options;
+        let intensity = if options.output.attributes.intensity { PACKED_INTENSITY } else { 0 };
+        let (point_file, leaves) = (points * (BYTES_PER_POINT + intensity), points * (STORE_PER_SITE + intensity));
+        let per_tile = most_per_tile(plan);
+        let pixels = preview_pixels(plan);
+        let border = border_bytes(points, per_tile, tiles) + pixels * size_of::<PreviewPixel>() as u64 + OWN_FILES;
+        let store = leaves + border;
+        let raster = raster_bytes(plan);
+        let in_tiles = tile_bytes(points, tiles, &options.output, max_one_file, points > per_tile);
+        let page = if options.output.page { PAGE } else { 0 };
+        let results = in_tiles + pixels * PREVIEW_PER_PIXEL + page + raster;
+        if plan.is_one_part() && options.limits.keep_steps.keeps(points) {
+            // The points may go before the results come.
+            return DiskEstimate {
+                temporary: point_file.max(raster) + store,
+                store,
+                results,
+                least: store + point_file.max(results + raster),
+            };
+        }
+        // Points go while the store grows, and leaves while the results grow.
+        let most =
+            if options.output.max_edge == MaxEdge::Auto { store } else { border + waiting_leaves(plan, leaves, tiles) };
+        let temporary = point_file.max(most + raster);
+        DiskEstimate { temporary, store, results, least: point_file.max(most + results + raster) }
+    }
+}
+
+/// Returns the bytes of leaves whose tiles are not written yet, at most at one time. Tiles along the borders of large parts of the
+/// tree wait until these parts are joined.
+fn waiting_leaves(plan: &Plan, leaves: u64, tiles: u64) -> u64 {
+    if !plan.is_one_part() {
+        // All tiles along the border of a part wait, a fifth of some hundred.
+        return leaves / 4;
+    }
+    const SHARE: u64 = 20;
+    leaves / tiles.isqrt().max(SHARE) * SHARE
+}
+
+/// Tells whether the disk has ample room for all other files besides the points, which are there already.
+pub(crate) fn has_room_besides_points(plan: &Plan, kept: KeptPoints, max_one_file: u64) -> bool {
+    let DiskEstimate { store, results, .. } = DiskEstimate::of(plan, kept, max_one_file);
+    machine::free_disk(&plan.options.output.directory).is_some_and(|free| (store + results) / 4 * 5 <= free)
+}
+
+/// Returns about how many tiles there will be: tiles come out between half full and full.
+pub(crate) fn tiles(plan: &Plan, kept: KeptPoints) -> u64 {
+    (kept.0 * 4).div_ceil(most_per_tile(plan) * 3)
+}
+
+/// Returns the most points that a tile may have.
+fn most_per_tile(plan: &Plan) -> u64 {
+    let triangulation = &plan.options.triangulation;
+    let most = triangulation.max_points_per_tile.0;
+    if plan.is_one_part() { most } else { most.min(triangulation.max_points_per_part.0) }
+}
+
+/// Returns the bytes of the records that stay until the job is done.
+fn border_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
+    // A tile of n sites has about 2.2 sqrt(n) on its frontier, and more where points lie in rows.
+    let border_sites = (2.5 * (per_tile.min(points) as f64).sqrt()) as u64 * tiles;
+    border_sites * STORE_PER_BORDER_SITE
+}
+
+/// Returns the most pixels of the preview: those of the box in the headers. What a filter leaves of the points may have any other.
+fn preview_pixels(plan: &Plan) -> u64 {
+    if has_filter(plan) {
+        return LONGER_SIDE * LONGER_SIDE;
+    }
+    let [[xmin, ymin], [xmax, ymax]] = [plan.extent.min, plan.extent.max];
+    let bounds = plan.with_lines(Bounds { min: [xmin, ymin, 0], max: [xmax, ymax, 0] });
+    let size = Canvas::new(&plan.frame, bounds, HeightRange { low: 0, high: 0 }).size();
+    size.map(u64::from).iter().product()
+}
+
+/// Returns the bytes of the tiles, the coarser ones and `terrain.glb`. `has_levels` tells whether there are coarser tiles.
+fn tile_bytes(points: u64, tiles: u64, output: &OutputOptions, max_one_file: u64, has_levels: bool) -> u64 {
+    let (compression, attributes) = (output.packing(), output.attributes);
+    let in_tiles = points * result_per_site(compression, attributes) + tiles * RESULT_PER_TILE;
+    let in_levels = if has_levels && output.levels { in_tiles / 3 } else { 0 };
+    // terrain.glb is never packed with meshopt.
+    let unpacked = if compression == Compression::None { Compression::None } else { Compression::Quantized };
+    let has_one_file = output.format != OutputFormat::Tiles3d && 2 * points <= max_one_file;
+    let in_one_file = if has_one_file { points * result_per_site(unpacked, attributes) } else { 0 };
+    in_tiles + in_levels + in_one_file
+}
+
+/// Returns the bytes of the raster. While it is put together, its blocks take as many once more. All files of a grid of files count, because
+/// the headers of the inputs do not tell which will have no height.
+fn raster_bytes(plan: &Plan) -> u64 {
+    let Some((options, grid)) = plan.options.output.raster.zip(planned_raster(plan)) else { return 0 };
+    let files = grid.files(options.cells_per_file);
+    let stored: u64 = files.iter().map(|cells| grid.part(*cells).stored_cells()).sum();
+    let heads = files.len() as u64 * RASTER_FILE;
+    match options.compression {
+        RasterCompression::None => stored * size_of::<f32>() as u64 + heads,
+        // Three bytes for a cell of rough terrain, and a third more for overviews. Cells without a height take a thousandth.
+        RasterCompression::Deflate => grid.cells() * 4 + stored / 200 + heads,
+    }
+}
+
+/// Returns about how many bytes of memory the job of `plan` takes on `threads` threads.
+pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
+    let (options, points) = (&plan.options, kept.0);
+    let per_tile = options.triangulation.max_points_per_tile.0;
+    let leaves = per_tile.min(points) * BYTES_PER_LEAF_SITE * threads as u64;
+    let levels = level_memory(options, points, threads);
+    let buffers = buffer_bytes(points, per_tile, read_buffer_memory(options));
+    let is_remote = |input: &PlannedInput| input.source.path.to_str().is_some_and(is_url);
+    let buffers = if plan.inputs.iter().any(is_remote) { buffers + network_memory(options) } else { buffers };
+    PROCESS_MEMORY + leaves.max(levels).max(buffers).max(raster_memory(plan, threads))
+}
+
+fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {
+    let sizes = LevelSizes::new(options.output.max_points_per_level_tile.0, options.limits.memory.0);
+    let one = (4 * sizes.sites).min(points) * BYTES_PER_LEVEL_VERTEX;
+    if options.output.levels { (one * threads as u64).min(sizes.memory) } else { 0 }
+}
+
+/// Returns the bytes of the files that an interrupted run left and that this one takes over or replaces.
+pub(crate) fn own_bytes(plan: &Plan) -> u64 {
+    let directory = JobDirectory::new(&plan.options.output.directory);
+    let entries = std::fs::read_dir(directory.job()).into_iter().flatten().flatten();
+    bytes_of(entries.map(|entry| entry.path())) + bytes_of(directory.waiting_results())
+}
+
+/// Returns the bytes of the results of an earlier job, which stay until those of this one are whole.
+pub(crate) fn earlier_bytes(plan: &Plan) -> u64 {
+    bytes_of(JobDirectory::new(&plan.options.output.directory).earlier_results())
+}
+
+/// Returns the bytes of those of `paths` that are files.
+fn bytes_of(paths: impl IntoIterator<Item = PathBuf>) -> u64 {
+    let data = paths.into_iter().filter_map(|path| path.metadata().ok());
+    data.filter(|data| data.is_file()).map(|data| data.len().min(machine::allocated(&data))).sum()
+}

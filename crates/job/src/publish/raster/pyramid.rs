@@ -1,0 +1,133 @@
+//! Drawing a raster window by window, and its overviews from the windows.
+
+use crate::index::TileIndex;
+use crate::publish::raster::waiting_blocks::WaitingBlocks;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use sys::Result;
+use tiles::raster::BLOCK;
+use tiles::raster::block::packed;
+use tiles::raster::grid::blocks;
+use tiles::raster::options::RasterOptions;
+use tiles::raster::overview::halved;
+use tiles::raster::window::{FilledBlock, LatticeMesh, Window, filled};
+
+/// A tile, and the first column and row that it may cover, and those after the last.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TileCells {
+    pub(super) tile: TileIndex,
+    pub(super) columns: [u32; 2],
+    pub(super) rows: [u32; 2],
+}
+
+/// What a raster is drawn from, and where its blocks go.
+pub(super) struct Pyramid<'a> {
+    pub(super) options: RasterOptions,
+    /// The sizes of the raster and its overviews.
+    pub(super) levels: Vec<[u32; 2]>,
+    /// A window has the cells of one block of this level.
+    pub(super) window_level: usize,
+    pub(super) read: &'a (dyn Fn(TileIndex) -> Result<LatticeMesh> + Sync),
+    pub(super) blocks: &'a WaitingBlocks,
+    /// Is told of each block of the raster itself that has a height.
+    pub(super) done: &'a (dyn Fn() + Sync),
+    /// Cells with a height.
+    pub(super) heights: AtomicU64,
+    /// Those of them whose height is just the number for none.
+    pub(super) same_as_nodata: AtomicU64,
+}
+
+impl Pyramid<'_> {
+    /// Draws everything. `window` has the side that belongs to [`Pyramid::window_level`].
+    ///
+    /// # Errors
+    /// Those of reading a tile and of adding a block; [`sys::Error::Interrupted`].
+    pub(super) fn draw(&self, window: &mut Window, tiles: &[TileCells]) -> Result<()> {
+        self.block(self.levels.len() - 1, [0, 0], tiles, window).map(|_| ())
+    }
+
+    /// Draws what is below a block of level `level`, of which `tiles` cover something, and returns its pixels.
+    fn block(&self, level: usize, at: [usize; 2], tiles: &[TileCells], window: &mut Window) -> Result<Vec<f32>> {
+        if level == self.window_level {
+            return self.window(at, tiles, window);
+        }
+        let mut image = vec![f32::NAN; BLOCK * BLOCK];
+        let below = blocks(self.levels[level - 1]);
+        for quarter in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            let child = [0, 1].map(|axis| 2 * at[axis] + quarter[axis]);
+            let tiles = within(tiles, level - 1, child);
+            if child[0] >= below[0] || child[1] >= below[1] || tiles.is_empty() {
+                continue;
+            }
+            let pixels = self.block(level - 1, child, &tiles, window)?;
+            let half = halved(BLOCK, |n| pixels[n]);
+            let first = quarter[1] * BLOCK / 2 * BLOCK + quarter[0] * BLOCK / 2;
+            for (row, pixels) in half.chunks_exact(BLOCK / 2).enumerate() {
+                image[first + row * BLOCK..][..BLOCK / 2].copy_from_slice(pixels);
+            }
+        }
+        self.add(level, at, filled(BLOCK, [0, 0], self.options.nodata.number(), |n| image[n]))?;
+        Ok(image)
+    }
+
+    /// Draws a window and the overviews of it. Returns the pixels of the last, which is one block.
+    fn window(&self, at: [usize; 2], tiles: &[TileCells], window: &mut Window) -> Result<Vec<f32>> {
+        let side = window.side();
+        window.move_to(at.map(|block| (block * side) as u32));
+        tiles.par_iter().with_max_len(1).try_for_each(|tile| window.draw(&(self.read)(tile.tile)?))?;
+        let window = &*window;
+        self.add_blocks(0, at, side, &|number| window.height(number))?;
+        let mut image: Option<Vec<f32>> = None;
+        for level in 1..=self.window_level {
+            let side = side >> (level - 1);
+            let next = match &image {
+                None => halved(side, |number| window.height(number)),
+                Some(image) => halved(side, |number| image[number]),
+            };
+            self.add_blocks(level, at, side / 2, &|number| next[number])?;
+            image = Some(next);
+        }
+        Ok(image.unwrap_or_else(|| (0..side * side).map(|number| window.height(number)).collect()))
+    }
+
+    /// Adds the blocks of the window `at`, whose image at `level` has a side of so many pixels.
+    fn add_blocks(
+        &self,
+        level: usize,
+        at: [usize; 2],
+        side: usize,
+        pixel: &(dyn Fn(usize) -> f32 + Sync),
+    ) -> Result<()> {
+        let along = side / BLOCK;
+        let all = blocks(self.levels[level]);
+        (0..along * along).into_par_iter().with_max_len(1).try_for_each(|number| {
+            let inside = [number % along, number / along];
+            let block = [0, 1].map(|axis| at[axis] * along + inside[axis]);
+            if block[0] >= all[0] || block[1] >= all[1] {
+                return Ok(());
+            }
+            self.add(level, block, filled(side, inside, self.options.nodata.number(), pixel))
+        })
+    }
+
+    /// Adds a block and counts its heights. A block without a height is not added.
+    fn add(&self, level: usize, at: [usize; 2], block: Option<FilledBlock>) -> Result<()> {
+        let Some(FilledBlock { cells, heights, same_as_nodata }) = block else { return Ok(()) };
+        let [columns, _] = blocks(self.levels[level]);
+        self.blocks.add(level, at[1] * columns + at[0], &packed(&cells, self.options.compression))?;
+        if level == 0 {
+            self.heights.fetch_add(heights, Ordering::Relaxed);
+            self.same_as_nodata.fetch_add(same_as_nodata, Ordering::Relaxed);
+            (self.done)();
+        }
+        Ok(())
+    }
+}
+
+/// Returns those of `tiles` that may cover something below a block of level `level`.
+fn within(tiles: &[TileCells], level: usize, at: [usize; 2]) -> Vec<TileCells> {
+    let span = (BLOCK as u64) << level;
+    let [columns, rows] = at.map(|block| [block as u64 * span, (block as u64 + 1) * span]);
+    let meet = |own: [u32; 2], others: [u64; 2]| u64::from(own[0]) < others[1] && others[0] < u64::from(own[1]);
+    tiles.iter().filter(|tile| meet(tile.columns, columns) && meet(tile.rows, rows)).copied().collect()
+}

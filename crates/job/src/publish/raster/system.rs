@@ -1,0 +1,40 @@
+//! What a raster says of the job's coordinate reference system.
+
+use crate::plan::job_plan::Plan;
+use points::Crs;
+use tiles::raster::geokeys::RasterSystem;
+
+/// Returns what the raster of a job says of its system.
+pub(crate) fn system_of(plan: &Plan) -> RasterSystem {
+    let (crs, extras) = (&plan.crs, plan.frame.extras());
+    let heights = crs.vertical_system.as_ref();
+    let metres_z = extras.metres_per_unit_z;
+    let system = RasterSystem {
+        vertical_code: heights.and_then(|system| system.system_code(metres_z)).and_then(short),
+        vertical_name: crs.vertical_name(),
+        vertical_metres: (heights.is_some() || crs.vertical.is_some()).then_some(metres_z),
+        ..RasterSystem::default()
+    };
+    if !crs.is_named() {
+        return system;
+    }
+    // A code whose text says otherwise is not what the coordinates are in.
+    let code = crs.undisputed_code().and_then(short);
+    let metres = Some(extras.metres_per_unit);
+    RasterSystem { code, text: crs.wkt.clone(), name: crs.name.clone(), metres, ..system }
+}
+
+fn short(code: u32) -> Option<u16> {
+    u16::try_from(code).ok()
+}
+
+/// Returns a warning if the inputs name a system that the raster cannot name.
+pub(crate) fn system_warning(crs: &Crs, system: &RasterSystem) -> Option<String> {
+    (crs.is_named() && !system.is_placed()).then(|| {
+        format!(
+            "terrain.tif does not say its CRS, {}: it has no EPSG code, and its text is missing or too long for the file; name it \
+             when you open the file",
+            crs.label()
+        )
+    })
+}

@@ -1,0 +1,56 @@
+//! The tiles that a raster is drawn from.
+
+use crate::index::TileIndex;
+use crate::publish::side_files::EachTile;
+use crate::records::TileSummary;
+use delaunay::geometry::Bounds;
+use std::path::Path;
+use sys::{Error, Result, interrupt};
+use tiles::frame::Frame;
+use tiles::gltf::read::{TileFile, read_surface};
+use tiles::raster::window::LatticeMesh;
+
+/// A tile with triangles, and the box around them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TileBox {
+    pub(crate) tile: TileIndex,
+    pub(crate) bounds: Bounds<2>,
+    /// The lowest and the highest height.
+    pub(crate) heights: [i32; 2],
+}
+
+/// Returns all tiles with triangles.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on a store.
+pub(crate) fn boxes(tiles: &dyn EachTile) -> Result<Vec<TileBox>> {
+    let mut boxes = Vec::new();
+    tiles.visit(&mut |store, tile| {
+        interrupt::check()?;
+        if let Some(Bounds { min, max }) = TileSummary::load(store, tile)?.bounds() {
+            let bounds = Bounds { min: [min[0], min[1]], max: [max[0], max[1]] };
+            boxes.push(TileBox { tile, bounds, heights: [min[2], max[2]] });
+        }
+        Ok(())
+    })?;
+    Ok(boxes)
+}
+
+/// Returns the mesh of the tile at `path` on the lattice, of which `frame` is the scene.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Input`] if the file cannot be read or is damaged.
+pub(crate) fn lattice_mesh(path: &Path, frame: &Frame) -> Result<LatticeMesh> {
+    let TileFile { parts, .. } = read_surface(path)?;
+    let mut mesh = LatticeMesh::default();
+    for part in &parts {
+        let first = mesh.positions.len() as u32;
+        for v in 0..part.positions.len() {
+            let world = part.world(v);
+            let off_lattice = || Error::input(path, format!("the vertex at {world:?} is not on the job's lattice"));
+            mesh.positions.push(frame.integers(world).ok_or_else(off_lattice)?);
+        }
+        mesh.triangles.extend(part.triangles.iter().map(|triangle| triangle.map(|v| first + v)));
+    }
+    Ok(mesh)
+}

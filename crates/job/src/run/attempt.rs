@@ -1,0 +1,316 @@
+//! Attempts at a job: each begins where the last run stopped, and ends with a clean directory or with steps to go on from. If the
+//! finished mesh proves too fine for single precision, another attempt takes a coarser lattice.
+
+use crate::durable::cleaning::remove_job;
+use crate::durable::directory::JobDirectory;
+use crate::durable::lock::Lock;
+use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
+use crate::options::{JobOptions, RunOptions};
+use crate::partition::parts::Parts;
+use crate::partition::result::Partition;
+use crate::plan::budget::workers;
+use crate::plan::fingerprint::{Fingerprint, JobHeader};
+use crate::plan::job_plan::Plan;
+use crate::plan::lattice_choice::LatticeCoarsening;
+use crate::plan::make_plan::{are_there_far_points, make_plan};
+use crate::preflight::check::require_room;
+use crate::preflight::input_places::check_inputs_are_no_results;
+use crate::progress::clock::JobClock;
+use crate::progress::stage::{JobProgress, ProgressOutput};
+use crate::publish::height_offset_check::check_height_offset;
+use crate::publish::raster::check::check_raster;
+use crate::report::job_report::Report;
+use crate::run::alone::Alone;
+use crate::run::damage::damaged_by_tasks;
+use crate::run::finished::{InPlace, known_submission, results_in_place};
+use crate::run::part_entries::StepsOfParts;
+use crate::run::read_step::note_skipped;
+use crate::run::resume;
+use crate::run::resume::{EarlierRun, RunStart, place_results_of_finished_job};
+use crate::run::resume_parts::start_parts;
+use crate::run::run_context::RunContext;
+use crate::run::stage_costs::stage_costs;
+use crate::run::temporary_bytes::TemporaryBytes;
+use delaunay_gpu::triangulator::Triangulator;
+use std::io::ErrorKind;
+use std::sync::Mutex;
+use sys::threads::on_threads;
+use sys::{Error, Result, disk};
+
+/// What the user must know where a lock keeps nobody out.
+pub(crate) const NO_LOCKS: &str =
+    "the file system of the output directory has no locks: see to it that no other process works there";
+
+/// Give up after this many tenfold coarsenings: what is left is no terrain.
+const MAX_COARSENINGS: u32 = 6;
+
+/// The walk of a job through the steps after the plan. The partition is that of an earlier run, if one read the points.
+pub(crate) type Walk = fn(&RunContext, Plan, Option<Partition>) -> Result<Report>;
+
+/// Who has done what is there of a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum EarlierWork {
+    /// A run that was interrupted, so what it left may be damaged.
+    Interrupted,
+    /// Tasks, and all phases by part are complete: what is there is on the disk.
+    ByTasks,
+}
+
+/// What all attempts at a job have in common.
+struct JobRequest<'a> {
+    options: &'a JobOptions,
+    run: RunOptions,
+    triangulator: Triangulator,
+    directory: JobDirectory,
+    fingerprint: Fingerprint,
+    /// Says which inputs seem to have changed since tasks planned the job.
+    modified: Option<String>,
+    clock: JobClock,
+    walk: Walk,
+    work: EarlierWork,
+    /// The submission that started the job over; 0 if none did.
+    submission: u64,
+}
+
+/// Runs a job, or what an interrupted run left of it.
+///
+/// # Errors
+/// See [`crate::run`].
+pub(crate) fn run_until_it_fits(
+    options: &JobOptions,
+    run: RunOptions,
+    walk: Walk,
+    work: EarlierWork,
+) -> Result<Report> {
+    let clock = JobClock::start();
+    let directory = JobDirectory::new(&options.output.directory);
+    check_nothing_in_the_way(&directory)?;
+    let (mut lock, mut earlier) = (None, None);
+    if !disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.is_empty() {
+        // Before anything else can fail: an earlier run may have been cut off while its results took their places.
+        lock = Some(directory.lock()?);
+        earlier = read_earlier(&directory, run)?;
+        if let (None, false) = (&earlier, run.restart)
+            && let InPlace::ThisJob(report) = results_in_place(&directory, options, run.submission, || Ok(false))?
+        {
+            run.progress.note("the interrupted run had put all its results in place");
+            on_threads(workers(options, 0)?, || remove_job(&directory))?;
+            return Ok(*report);
+        }
+    }
+    let known = earlier.as_ref().map_or(0, |earlier| earlier.submission);
+    let submission = known.max(run.submission).max(known_submission(&directory)?);
+    // Before the inputs, so that a job that must have a GPU fails at once if there is none.
+    let memory = options.limits.memory.0;
+    let triangulator = match work {
+        EarlierWork::Interrupted => Triangulator::new(&options.triangulation, &options.gpu, memory)?,
+        // All is triangulated, and this machine may have no GPU.
+        EarlierWork::ByTasks => Triangulator::without_gpu(&options.triangulation),
+    };
+    let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
+    let (fingerprint, modified) = match (work, &earlier) {
+        (EarlierWork::ByTasks, Some(earlier)) => earlier.as_planned(fingerprint)?,
+        (EarlierWork::ByTasks, None) => {
+            return Err(Error::TooEarly("the plan of the job is gone: submit the job again".into()));
+        }
+        (EarlierWork::Interrupted, _) => (fingerprint, None),
+    };
+    let job =
+        JobRequest { options, run, triangulator, directory, fingerprint, modified, clock, walk, work, submission };
+    let mut coarsening = coarsening_of(&job.directory, earlier.as_ref(), &job.fingerprint)?;
+    let mut has_looked = coarsening.far_points;
+    loop {
+        let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
+        // A few points that are mistakes must not cost all others their precision.
+        if matches!(outcome, Err(Error::NeedsOnePart | Error::TooFine { .. })) && !has_looked {
+            has_looked = true;
+            coarsening.far_points = on_threads(workers(options, 0)?, || are_there_far_points(options, coarsening))?;
+            if coarsening.far_points {
+                run.progress.note("some points lie far from all others; starting again without them");
+                continue;
+            }
+        }
+        // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
+        if let (Err(Error::NeedsOnePart), false) = (&outcome, coarsening.one_part) {
+            run.progress.note("what was read contradicts the header of a file; starting again without parts");
+            coarsening.one_part = true;
+            continue;
+        }
+        if let Err(Error::DamagedSteps) = outcome {
+            if work == EarlierWork::ByTasks {
+                // The work of many machines is not done again by one.
+                return Err(damaged_by_tasks(&job.directory));
+            }
+            run.progress.note("what the interrupted run left is damaged; starting over");
+            continue;
+        }
+        let Err(Error::TooFine { vertical, what }) = outcome else { return outcome };
+        let (power, axes) = match vertical {
+            true => (&mut coarsening.vertical, "z"),
+            false => (&mut coarsening.horizontal, "x and y"),
+        };
+        if !may_coarsen(options, vertical) || *power >= MAX_COARSENINGS {
+            return Err(Error::TooFine { vertical, what });
+        }
+        run.progress.note(&format!("{what}; starting again with a coarser step in {axes}"));
+        *power += 1;
+    }
+}
+
+/// Tells whether the lattice may become coarser, which it may not if the user has set its step.
+pub(crate) fn may_coarsen(options: &JobOptions, vertical: bool) -> bool {
+    let set = if vertical { options.input.resolution_z } else { options.input.resolution };
+    set.step().is_none()
+}
+
+/// Returns how much coarser the lattice is than the inputs ask for, and whether the job is one part, as far as an earlier run of the same
+/// job has found out.
+pub(crate) fn coarsening_of(
+    directory: &JobDirectory,
+    earlier: Option<&EarlierRun>,
+    fingerprint: &Fingerprint,
+) -> Result<LatticeCoarsening> {
+    let Some(mut known) = earlier.and_then(|earlier| earlier.coarsening(fingerprint)) else {
+        return Ok(LatticeCoarsening::default());
+    };
+    known.one_part |= Alone::find(directory, 0)? == Some(Alone::InOnePart);
+    Ok(known)
+}
+
+/// Reads what an earlier run left, unless the job is to start over. If it left all its results, they take their places in any case:
+/// it may have been cut off among them.
+pub(crate) fn read_earlier(directory: &JobDirectory, run: RunOptions) -> Result<Option<EarlierRun>> {
+    let mut earlier = EarlierRun::read(directory)?;
+    if let Some(earlier) = earlier.as_mut() {
+        earlier.place_whole_results(directory)?;
+        if run.restart || earlier.submission < run.submission {
+            earlier.forget();
+        } else if !earlier.is_readable() {
+            run.progress.note("the journal of the earlier run is damaged or of another version; starting over");
+        }
+    }
+    Ok(earlier)
+}
+
+fn attempt(
+    job: &JobRequest,
+    coarsening: LatticeCoarsening,
+    earlier: Option<EarlierRun>,
+    lock: Option<Lock>,
+) -> Result<Report> {
+    let JobRequest { options, run, ref directory, clock, .. } = *job;
+    let header =
+        JobHeader { fingerprint: job.fingerprint.clone(), coarsening, id: 0, submission: job.submission, begun: None };
+    let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
+    let mut plan = match earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options)) {
+        Some(plan) => plan,
+        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
+    };
+    check_inputs_are_no_results(&plan)?;
+    plan.warnings.extend(job.modified.clone());
+    check_height_offset(&plan)?;
+    check_raster(&plan)?;
+    stage.advance(1);
+    let planned = stage.finish();
+    let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));
+    note_skipped(&plan.skipped, progress);
+    let threads = workers(options, plan.records)?;
+    if !run.force && job.work == EarlierWork::Interrupted {
+        on_threads(threads, || require_room(&plan, threads))?;
+    }
+    check_results_are_ours(directory, options.output.page)?;
+    let mut earlier = earlier;
+    let lock_of_job = match lock {
+        Some(lock) => lock,
+        None => {
+            let lock = directory.lock()?;
+            // Another process may have begun the job, and stopped, since this one looked.
+            earlier = read_earlier(directory, run)?;
+            lock
+        }
+    };
+    if !lock_of_job.is_real() {
+        progress.note(NO_LOCKS);
+    }
+    // Tasks have worked since the plan, and this process only ends it.
+    let begun = earlier.as_ref().filter(|_| job.work == EarlierWork::ByTasks).and_then(|earlier| earlier.begun());
+    let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
+    if let Some(report) = complete.flatten() {
+        progress.note("the interrupted run had written all its results");
+        on_threads(threads, || remove_job(directory))?;
+        return Ok(report);
+    }
+    job.triangulator.prepare(plan.records, threads);
+    let is_one_part = plan.is_one_part();
+    on_threads(threads, || {
+        let start = match is_one_part {
+            true => resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?,
+            // That tasks have done steps is nothing to tell.
+            false if job.work == EarlierWork::ByTasks => {
+                start_parts(directory, &header, earlier, ProgressOutput::Quiet)?
+            }
+            false => start_parts(directory, &header, earlier, run.progress)?,
+        };
+        let RunStart { store, journal, partition, job_id, resumed } = start;
+        let context = RunContext {
+            triangulator: &job.triangulator,
+            directory,
+            store: &store,
+            journal: &journal,
+            progress,
+            threads,
+            clock,
+            begun,
+            identity: job.fingerprint.identity(options, job.submission)?,
+            job_id,
+            resumed: if job.work == EarlierWork::ByTasks { 0 } else { journal.taken_over() + resumed },
+            is_by_tasks: job.work == EarlierWork::ByTasks,
+            temporary: TemporaryBytes::default(),
+            stages: Mutex::new(vec![planned]),
+        };
+        let outcome = (job.walk)(&context, plan, partition);
+        drop(context);
+        // Finished steps reach the disk before a message says that they are kept.
+        let of_parts = || StepsOfParts::of(directory, job_id).map_or(0, |steps| steps.count);
+        let steps = journal.close() + outcome.as_ref().err().map_or(0, |_| of_parts());
+        // An open file is not freed when it is removed.
+        drop(store);
+        end(directory, outcome, steps, job.work, is_one_part)
+    })
+}
+
+/// Ends an attempt: puts the results in place, or keeps the finished steps if the job can go on from them. Removes everything else, but
+/// never the work of tasks after an error.
+fn end(
+    directory: &JobDirectory,
+    outcome: Result<Report>,
+    steps: u64,
+    work: EarlierWork,
+    is_one_part: bool,
+) -> Result<Report> {
+    let is_by_tasks = work == EarlierWork::ByTasks;
+    let outcome = outcome.and_then(|report| match place_results_of_finished_job(directory) {
+        Err(Error::Io { source, .. }) if is_by_tasks && source.kind() == ErrorKind::NotFound => {
+            Err(Error::DamagedSteps)
+        }
+        placed => placed.map(|()| report),
+    });
+    match outcome {
+        Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),
+        // With a corrected configuration a job of several parts may start over, so nothing is promised.
+        Err(why @ Error::Config(_)) if steps > 0 && !is_one_part => Err(why),
+        Err(why) if may_go_on(&why) && steps > 0 => {
+            Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
+        }
+        outcome => {
+            let cleaned = remove_job(directory);
+            // The first error is the one to report.
+            outcome.and_then(|report| cleaned.map(|()| report))
+        }
+    }
+}
+
+/// Tells whether another run can make use of the finished steps: with the same options, or with others for how tiles look.
+fn may_go_on(why: &Error) -> bool {
+    why.exit_code() == 1 || matches!(why, Error::Config(_) | Error::Io { .. })
+}

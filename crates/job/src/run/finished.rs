@@ -1,0 +1,116 @@
+//! Whether a job is finished, which its report tells: it takes its place last, and an old one goes first. So wherever a report is, the
+//! results are whole, also while what only the steps needed is being removed, and after that.
+
+use crate::durable::cleaning::remove_job;
+use crate::durable::directory::JobDirectory;
+use crate::durable::journal;
+use crate::options::JobOptions;
+use crate::plan::budget::workers;
+use crate::plan::fingerprint::{Fingerprint, JobHeader};
+use crate::records::{JobStep, StepRecord};
+use crate::report::job_report::Report;
+use crate::run::alone::Alone;
+use std::io::ErrorKind;
+use sys::threads::on_threads;
+use sys::{Error, Result, disk};
+use tiles::checksums::{read_file, seal};
+
+/// What a job finds in the place of its results.
+pub(crate) enum InPlace {
+    /// Nothing that says whose they are, or the job is under way again.
+    Nothing,
+    /// The results of a job with other options or inputs, of another version of the program, or from before a submission that starts the
+    /// job over.
+    OtherJob,
+    /// Its own results. It is finished.
+    ThisJob(Box<Report>),
+}
+
+/// Returns what the job with these `options` finds in the place of its results. What was done before `submission` does not count.
+/// `is_under_way` tells whether steps of this job are there. The inputs are read only where all else says that the job is finished.
+///
+/// # Errors
+/// [`Error::Io`] if the report or an input cannot be read, [`Error::Config`] if there are no inputs.
+pub(crate) fn results_in_place(
+    directory: &JobDirectory,
+    options: &JobOptions,
+    submission: u64,
+    is_under_way: impl FnOnce() -> Result<bool>,
+) -> Result<InPlace> {
+    let waiting = directory.output().report();
+    if disk::exists(&waiting).map_err(Error::io("read", &waiting))? || Alone::find(directory, 0)?.is_some() {
+        return Ok(InPlace::Nothing);
+    }
+    let path = directory.results().report();
+    let text = match read_file(&path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(InPlace::Nothing),
+        text => text.map_err(Error::io("read", &path))?,
+    };
+    let is_sealed = seal(&text).is_some_and(|(own, found)| own == found);
+    // A report of another version may have other fields.
+    let report = serde_json::from_slice::<Report>(&text).ok().filter(|_| is_sealed);
+    let Some(report) = report else { return Ok(InPlace::OtherJob) };
+    let of_options = Fingerprint::of_options(options)?;
+    if report.options_fingerprint != Some(of_options) || report.submission < submission {
+        return Ok(InPlace::OtherJob);
+    }
+    if is_under_way()? {
+        return Ok(InPlace::Nothing);
+    }
+    let is_same = match on_threads(workers(options, 0)?, || Fingerprint::of(options)) {
+        Ok(now) => report.job_fingerprint == Some(now.of_job(of_options)),
+        // Who has moved the inputs away since has not undone the job.
+        Err(why) if are_inputs_gone(&why) => true,
+        Err(why) => return Err(why),
+    };
+    Ok(if is_same { InPlace::ThisJob(report.into()) } else { InPlace::OtherJob })
+}
+
+fn are_inputs_gone(why: &Error) -> bool {
+    match why {
+        Error::Config(_) => true,
+        Error::Io { source, .. } => source.kind() == ErrorKind::NotFound,
+        _ => false,
+    }
+}
+
+/// Returns the latest submission that a note or a report in place tells of; 0 without one. What is done after it keeps its number, so that its
+/// late tasks find that the job is done.
+///
+/// # Errors
+/// [`Error::Io`] if the job directory or the report cannot be read.
+pub(crate) fn known_submission(directory: &JobDirectory) -> Result<u64> {
+    let path = directory.results().report();
+    let report = match read_file(&path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => None,
+        text => serde_json::from_slice::<Report>(&text.map_err(Error::io("read", &path))?).ok(),
+    };
+    let of_report = report.map_or(0, |report| report.submission);
+    Ok(of_report.max(Alone::submission(directory)?))
+}
+
+/// Tells whether the job directory holds nothing but the rest of a finished job: neither a note nor the journal of a job that has not
+/// written its report.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read.
+pub(crate) fn is_rest(directory: &JobDirectory) -> Result<bool> {
+    if disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.is_empty() {
+        return Ok(false);
+    }
+    let journal = journal::read_steps::<JobHeader, JobStep, StepRecord>(directory, |step| step == JobStep::Report)?;
+    Ok(Alone::find(directory, 0)?.is_none() && journal.is_none_or(|(_, entries)| !entries.is_empty()))
+}
+
+/// Ends the removal of the rest of a finished job, if one is there.
+///
+/// # Errors
+/// [`Error::InUse`] if another process works in the job directory, [`Error::Io`] if a file cannot be removed.
+pub(crate) fn remove_rest(directory: &JobDirectory, threads: usize) -> Result<()> {
+    if !is_rest(directory)? {
+        return Ok(());
+    }
+    let _lock = directory.lock()?;
+    // Another process may have begun a job meanwhile.
+    if is_rest(directory)? { on_threads(threads, || remove_job(directory)) } else { Ok(()) }
+}

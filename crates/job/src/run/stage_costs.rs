@@ -1,0 +1,43 @@
+//! What the stages of a job usually cost, for the estimate of the time left.
+
+use crate::plan::job_plan::Plan;
+use crate::publish::raster::check::planned_raster;
+use points::FileFormat;
+
+/// Nanoseconds of one processor for each point, measured on autzen.laz (see BENCHMARKS.md). Only their ratios matter.
+const MESH: f64 = 740.0;
+const LEVELS: f64 = 900.0;
+const PUBLISH: f64 = 8.0;
+
+/// The same for each cell of a raster, and for each that is stored: with those of overviews, and those that only fill blocks.
+const RASTER: f64 = 170.0;
+const RASTER_STORED: f64 = 60.0;
+
+fn cost_of_reading(format: FileFormat) -> f64 {
+    match format {
+        FileFormat::Las => 130.0,
+        FileFormat::Laz => 370.0,
+        FileFormat::Text => 250.0,
+    }
+}
+
+/// Returns the stages of the job in their order, by name, with the expected cost of each.
+pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
+    let sources = plan.inputs.iter().map(|input| &input.source);
+    let reading = sources.map(|source| source.records as f64 * cost_of_reading(source.format)).sum();
+    let points = plan.records as f64;
+    let raster = planned_raster(plan);
+    let raster = raster.map_or(0.0, |grid| grid.cells() as f64 * RASTER + grid.stored_cells() as f64 * RASTER_STORED);
+    vec![
+        ("read", reading),
+        ("mesh", points * MESH),
+        ("levels", points * LEVELS),
+        ("raster", raster),
+        ("publish", points * PUBLISH),
+    ]
+}
+
+/// Returns how much of the stage "mesh" is done for a tile of `points` points that is triangulated but not written.
+pub(crate) fn triangulated_share(points: u64) -> u64 {
+    points * 3 / 5
+}

@@ -1,0 +1,153 @@
+//! Which parts and tasks of a job are missing.
+
+use crate::durable::directory::JobDirectory;
+use crate::index::PartIndex;
+use crate::options::JobOptions;
+use crate::phase::{Phase, PhaseTasks};
+use crate::plan::budget::workers;
+use crate::plan::fingerprint::Fingerprint;
+use crate::records::JobStep;
+use crate::run::alone::Alone;
+use crate::run::finished::{InPlace, is_rest};
+use crate::run::part_entries::{PartHeader, entries_of_steps};
+use crate::run::parts::done::PartProgress;
+use crate::run::tasks::dealing::deal;
+use crate::run::tasks::finished_job::in_place;
+use crate::run::tasks::planned_job::{PlannedJob, planned};
+use std::collections::BTreeSet;
+use sys::threads::on_threads;
+use sys::{Error, Result};
+
+/// What is done of a planned job.
+pub(crate) struct JobProgressByPart<'a> {
+    pub(crate) job: &'a PlannedJob,
+    pub(crate) parts: Vec<PartProgress>,
+    is_joined: bool,
+}
+
+impl<'a> JobProgressByPart<'a> {
+    /// Reads the journals of all parts.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on a journal.
+    pub(crate) fn of(job: &'a PlannedJob) -> Result<JobProgressByPart<'a>> {
+        JobProgressByPart::of_parts(job, |_| true)
+    }
+
+    /// Reads the journals of the `wanted` parts. Nothing of the others counts as done.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on a journal.
+    pub(crate) fn of_parts(job: &'a PlannedJob, wanted: impl Fn(PartIndex) -> bool) -> Result<JobProgressByPart<'a>> {
+        let header = |part| PartHeader { job: job.header.id, part };
+        let part = |part| match wanted(part) {
+            true => PartProgress::of(&job.directory.part(part), header(part)),
+            false => Ok(PartProgress::default()),
+        };
+        let parts = job.parts.all().map(part).collect::<Result<_>>()?;
+        let above = header(PartIndex::new(job.parts.all().len()));
+        let joined = entries_of_steps(&job.directory.join(), above, |step| step == JobStep::Join)?;
+        Ok(JobProgressByPart { job, parts, is_joined: !joined.is_empty() })
+    }
+
+    /// Tells whether `phase`, which has one task, is done.
+    pub(crate) fn is_done(&self, phase: Phase) -> bool {
+        match phase {
+            Phase::Plan => true,
+            Phase::Join => self.is_joined,
+            _ => false,
+        }
+    }
+
+    /// Returns how many parts `phase` has.
+    pub(crate) fn parts_of(&self, phase: Phase) -> u64 {
+        deal(&self.job.plan, &self.job.parts, phase, 1).len() as u64
+    }
+
+    /// Returns the parts of `phase` that are missing, each with the number of the task that it falls to, of `tasks`.
+    pub(crate) fn missing(&self, phase: Phase, tasks: u32) -> Vec<(PartIndex, u32)> {
+        let mut dealt = deal(&self.job.plan, &self.job.parts, phase, tasks);
+        dealt.retain(|(part, _)| !self.parts[part.get()].has(phase));
+        dealt
+    }
+
+    /// Returns the tasks of `phase` that are missing, of `tasks`.
+    pub(crate) fn missing_tasks(&self, phase: Phase, tasks: u32) -> Vec<u32> {
+        match phase.is_by_part() {
+            true => numbers(&self.missing(phase, tasks)),
+            false if self.is_done(phase) => Vec::new(),
+            false => vec![1],
+        }
+    }
+
+    /// Checks that `phase` is complete, as far as it is about the `wanted` parts.
+    ///
+    /// # Errors
+    /// [`Error::TooEarly`] names the tasks that are missing.
+    pub(crate) fn require(&self, phase: Phase, tasks: u32, wanted: impl Fn(PartIndex) -> bool) -> Result<()> {
+        let mut missing = self.missing(phase, tasks);
+        missing.retain(|(part, _)| wanted(*part));
+        let numbers = if phase.is_by_part() { numbers(&missing) } else { self.missing_tasks(phase, tasks) };
+        if numbers.is_empty() { Ok(()) } else { Err(too_early(phase, &numbers, phase.tasks(tasks))) }
+    }
+}
+
+fn numbers(missing: &[(PartIndex, u32)]) -> Vec<u32> {
+    missing.iter().map(|(_, task)| *task).collect::<BTreeSet<u32>>().into_iter().collect()
+}
+
+/// Returns the error of a task that came before `phase` was complete: its `missing` tasks, of `count`.
+pub(crate) fn too_early(phase: Phase, missing: &[u32], count: u32) -> Error {
+    let numbers: Vec<String> = missing.iter().map(u32::to_string).collect();
+    let tasks = match missing.len() {
+        1 => format!("task {} of {count} is", numbers[0]),
+        _ => format!("tasks {} of {count} are", numbers.join(", ")),
+    };
+    Error::TooEarly(format!(
+        "the phase {phase} is not complete: {tasks} missing. Run them first; gdt-batch submit sends the tasks that are missing"
+    ))
+}
+
+/// Returns the error of a task of a job that is not planned.
+pub(crate) fn not_planned() -> Error {
+    too_early(Phase::Plan, &[1], 1)
+}
+
+/// Returns all phases of a job with the tasks that are missing; of a finished job only `publish`, if it has something to remove.
+///
+/// # Errors
+/// [`Error::Config`] if there are no inputs, [`Error::Io`] if one of them, or a journal, cannot be read.
+pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
+    let directory = JobDirectory::new(&options.output.directory);
+    if let InPlace::ThisJob(_) = in_place(&directory, options, 0)? {
+        let has_rest = is_rest(&directory)?;
+        return Ok(of_each(tasks, |phase| if phase == Phase::Publish && has_rest { vec![1] } else { Vec::new() }));
+    }
+    let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
+    let known = planned(&directory, 0)?;
+    let is_same = known.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
+    if is_same { missing_tasks_of_planned(options, tasks) } else { Ok(PhaseTasks::all(tasks)) }
+}
+
+/// Returns all phases of a job that is planned with the tasks that are missing.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the job directory.
+pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
+    let directory = JobDirectory::new(&options.output.directory);
+    let only_publish = || of_each(tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() });
+    if Alone::find(&directory, 0)?.is_some() {
+        return Ok(only_publish());
+    }
+    match PlannedJob::open(&directory, options, 0)? {
+        Some(job) if !job.is_complete => {
+            let progress = JobProgressByPart::of(&job)?;
+            Ok(of_each(tasks, |phase| progress.missing_tasks(phase, tasks)))
+        }
+        _ => Ok(only_publish()),
+    }
+}
+
+fn of_each(tasks: u32, missing: impl Fn(Phase) -> Vec<u32>) -> Vec<PhaseTasks> {
+    Phase::ALL.map(|phase| PhaseTasks { phase, count: phase.tasks(tasks), missing: missing(phase) }).to_vec()
+}

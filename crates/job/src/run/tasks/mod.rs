@@ -1,0 +1,74 @@
+//! Tasks: a job of several parts done by many processes, on any machines that share the output directory.
+//!
+//! A task takes the parts that fall to it, and does one phase of each. Nothing passes between tasks but the plan and the folders of
+//! parts, each of which has one writer at a time. So a task may be killed, run twice or run elsewhere, and the results have the same
+//! bytes, however many tasks there are.
+
+mod dealing;
+mod finished_job;
+pub(crate) mod missing;
+mod part_tasks;
+mod plan_task;
+mod planned_job;
+pub(crate) mod status;
+
+use crate::durable::directory::JobDirectory;
+use crate::options::{JobOptions, RunOptions};
+use crate::phase::{Phase, Task};
+use crate::progress::clock::JobClock;
+use crate::report::job_report::Report;
+use crate::report::task_outcome::{DoneTask, TaskOutcome};
+use crate::run::alone::Alone;
+use crate::run::attempt::{EarlierWork, Walk, run_until_it_fits};
+use crate::run::finished::{InPlace, remove_rest};
+use crate::run::tasks::finished_job::in_place;
+use crate::run::tasks::missing::{JobProgressByPart, not_planned};
+use crate::run::tasks::part_tasks::work_on_parts;
+use crate::run::tasks::plan_task::plan;
+use crate::run::tasks::planned_job::PlannedJob;
+use sys::Result;
+
+/// Does one task of one phase of a job. `walk` is what a process does that does all of it.
+///
+/// # Errors
+/// See [`crate::work`].
+pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Task, walk: Walk) -> Result<TaskOutcome> {
+    let clock = JobClock::start();
+    let mut done = DoneTask::new(phase, task);
+    // A phase with one task is done by the first.
+    if phase.is_by_part() || task.number == 1 {
+        let directory = &JobDirectory::new(&options.output.directory);
+        let in_place = in_place(directory, options, run.submission)?;
+        match (phase, in_place) {
+            (Phase::Publish, InPlace::ThisJob(report)) => {
+                remove_rest(directory, options.threads())?;
+                return Ok(TaskOutcome::Published(report));
+            }
+            (_, InPlace::ThisJob(_)) => done.note = Some("nothing to do: all results are in place".into()),
+            (Phase::Publish, _) => {
+                return publish(directory, options, run, task, walk)
+                    .map(|report| TaskOutcome::Published(report.into()));
+            }
+            (Phase::Plan, _) => done.note = plan(options, run)?,
+            (_, _) => (done.parts, done.note) = work_on_parts(options, run, phase, task)?,
+        }
+    }
+    done.seconds = clock.wall_s();
+    Ok(TaskOutcome::Done(done))
+}
+
+/// Publishes a job whose other phases are complete, or does all of a job that tasks have left to one process.
+fn publish(directory: &JobDirectory, options: &JobOptions, run: RunOptions, task: Task, walk: Walk) -> Result<Report> {
+    let work = match Alone::find(directory, run.submission)? {
+        Some(_) => EarlierWork::Interrupted,
+        None => {
+            let job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
+            if !job.is_complete {
+                let progress = JobProgressByPart::of(&job)?;
+                Phase::ALL[..6].iter().try_for_each(|&phase| progress.require(phase, task.count, |_| true))?;
+            }
+            EarlierWork::ByTasks
+        }
+    };
+    run_until_it_fits(options, run, walk, work)
+}

@@ -1,0 +1,211 @@
+//! The phases between the plan and publishing.
+
+use crate::durable::directory::JobDirectory;
+use crate::durable::lock::Lock;
+use crate::index::PartIndex;
+use crate::options::{JobOptions, RunOptions};
+use crate::phase::{Phase, Task};
+use crate::plan::budget::workers;
+use crate::progress::clock::JobClock;
+use crate::progress::stage::JobProgress;
+use crate::run::alone::Alone;
+use crate::run::attempt::{NO_LOCKS, may_coarsen};
+use crate::run::damage::{damaged_by_tasks, is_cut_off};
+use crate::run::parts::done::PartProgress;
+use crate::run::parts::join::{JoinedParts, join_parts};
+use crate::run::parts::level_phase::levels_of_part;
+use crate::run::parts::look::{SitesOfParts, early_look};
+use crate::run::parts::mesh_phase::{drop_damaged_steps, mesh_one};
+use crate::run::parts::part_store::PartStores;
+use crate::run::parts::parts_job::PartsJob;
+use crate::run::parts::read_phase::{read_for, sum_up};
+use crate::run::parts::tile_phase::{ForeignBorders, finish_part};
+use crate::run::publish_step::wants_tileset;
+use crate::run::tasks::dealing::deal;
+use crate::run::tasks::missing::{JobProgressByPart, not_planned, too_early};
+use crate::run::tasks::planned_job::PlannedJob;
+use crate::tiles::write_tile::TileStats;
+use delaunay_gpu::triangulator::Triangulator;
+use sys::threads::on_threads;
+use sys::{Error, Result, disk};
+use tiles::options::OutputFormat;
+
+/// Does `phase` of the parts that fall to `task`. Returns how many these are, and what there is to say.
+///
+/// # Errors
+/// [`Error::TooEarly`] if an earlier phase is not complete, [`Error::InUse`] if another process has one of the parts, and those of the
+/// steps.
+pub(crate) fn work_on_parts(
+    options: &JobOptions,
+    run: RunOptions,
+    phase: Phase,
+    task: Task,
+) -> Result<(u64, Option<String>)> {
+    let directory = &JobDirectory::new(&options.output.directory);
+    let lock = share(directory, run.submission)?.ok_or_else(not_planned)?;
+    if !lock.is_real() {
+        run.progress.note(NO_LOCKS);
+    }
+    if Alone::find(directory, run.submission)?.is_some() {
+        return Ok((0, Some(format!("nothing to do: {}", Alone::SENTENCE))));
+    }
+    let mut job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
+    if job.is_complete {
+        return Ok((0, Some("nothing to do: all results are written".into())));
+    }
+    let mine = parts_of(&job, phase, task);
+    if mine.is_empty() {
+        return Ok((0, None));
+    }
+    if phase == Phase::Read {
+        let inputs: Vec<usize> = mine.iter().flat_map(|&part| job.parts.new_inputs(part)).copied().collect();
+        job.find_inputs(inputs.into_iter())?;
+    }
+    let worked =
+        on_threads(workers(options, job.plan.records)?, || PartTask { job: &job, run, phase, task }.work(&mine));
+    let (alone, why) = match worked {
+        Err(Error::NeedsOnePart) => (Alone::InOnePart, "what was read contradicts the header of a file".into()),
+        Err(Error::TooFine { vertical, what }) if may_coarsen(options, vertical) => (Alone::AsItIs, what),
+        Err(Error::DamagedSteps) => return Err(damaged_by_tasks(directory)),
+        Err(error) if is_cut_off(&error, directory) => return Err(damaged_by_tasks(directory)),
+        worked => return worked.map(|()| (mine.len() as u64, None)),
+    };
+    alone.note(directory, job.header.submission)?;
+    Ok((mine.len() as u64, Some(format!("{why}; {}", Alone::SENTENCE))))
+}
+
+/// Returns the parts of `phase` that fall to `task`. A phase with one task does all.
+fn parts_of(job: &PlannedJob, phase: Phase, task: Task) -> Vec<PartIndex> {
+    let dealt = deal(&job.plan, &job.parts, phase, phase.tasks(task.count));
+    dealt.into_iter().filter(|(_, number)| *number == task.number).map(|(part, _)| part).collect()
+}
+
+/// Shares the lock of the job directory; `None` if there is none.
+fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
+    let journal = directory.journal();
+    let is_there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.contains(&journal);
+    let is_left = || Alone::find(directory, submission).map(|alone| alone.is_some());
+    if is_there || is_left()? { directory.share_lock().map(Some) } else { Ok(None) }
+}
+
+/// A task of a phase that is done by parts, or of join.
+struct PartTask<'a> {
+    job: &'a PlannedJob,
+    run: RunOptions,
+    phase: Phase,
+    task: Task,
+}
+
+impl PartTask<'_> {
+    /// Does the phase for the parts that are `mine`. Goes on with the others where another process has one.
+    fn work(&self, mine: &[PartIndex]) -> Result<()> {
+        let clock = JobClock::start();
+        let options = &self.job.plan.options;
+        let threads = rayon::current_num_threads();
+        let triangulator = match self.phase {
+            Phase::Mesh => Triangulator::new(&options.triangulation, &options.gpu, options.limits.memory.0)?,
+            _ => Triangulator::without_gpu(&options.triangulation),
+        };
+        triangulator.prepare(mine.iter().map(|&part| self.job.parts.expected_points(part)).sum(), threads);
+        let job = &PartsJob {
+            plan: &self.job.plan,
+            parts: &self.job.parts,
+            directory: &self.job.directory,
+            triangulator: &triangulator,
+            progress: &JobProgress::new(self.run.progress, clock, Vec::new()),
+            threads,
+            clock,
+            job_id: self.job.header.id,
+            resumed: 0,
+            checks: true,
+            journal: None,
+        };
+        match self.phase {
+            Phase::Read => self.each(mine, |part| read_for(job, part, 0).map(|_| ())),
+            Phase::Mesh => self.mesh(job, mine),
+            Phase::Join => self.join(job),
+            Phase::Tiles => self.tiles(job, mine),
+            Phase::Levels => self.levels(job, mine),
+            Phase::Plan | Phase::Publish => Ok(()),
+        }
+    }
+
+    /// Does `work` for each of `mine`. A part that another process has is left to it.
+    fn each(&self, mine: &[PartIndex], work: impl Fn(PartIndex) -> Result<()>) -> Result<()> {
+        let mut in_use = None;
+        for &part in mine {
+            match work(part) {
+                Err(error @ Error::InUse { .. }) => {
+                    self.run.progress.note(&format!("part {part} is left out: {error}"));
+                    in_use.get_or_insert(error);
+                }
+                outcome => outcome?,
+            }
+        }
+        in_use.map_or(Ok(()), Err)
+    }
+
+    fn mesh(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
+        let readers: Vec<PartIndex> = mine.iter().flat_map(|&part| job.parts.readers_of(part)).collect();
+        let is_reader = |part: PartIndex| readers.contains(&part);
+        JobProgressByPart::of_parts(self.job, is_reader)?.require(Phase::Read, self.task.count, is_reader)?;
+        let look = early_look(job)?;
+        self.each(mine, |part| mesh_one(job, part, look.as_ref(), None).map(|_| ()))
+    }
+
+    fn join(&self, job: &PartsJob) -> Result<()> {
+        let progress = JobProgressByPart::of(self.job)?;
+        let tasks = self.task.count;
+        progress.require(Phase::Read, tasks, |_| true)?;
+        progress.require(Phase::Mesh, tasks, |_| true)?;
+        let (_, bounds) = sum_up(job, progress.parts.iter().filter_map(|part| Some(&part.read.as_ref()?.figures)))?;
+        let mesh = progress.parts.iter().filter_map(|part| Some(&part.mesh.as_ref()?.figures));
+        let stores = &PartStores::new(job.directory, job.job_id);
+        join_parts(job, stores, SitesOfParts { sites: mesh.map(|mesh| mesh.leaves.sites).sum(), bounds })
+    }
+
+    fn tiles(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
+        let progress = JobProgressByPart::of_parts(self.job, |part| mine.contains(&part))?;
+        let joined = self.joined(job)?;
+        let stores = &PartStores::new(job.directory, job.job_id);
+        let borders = &ForeignBorders::new(job, stores, &joined);
+        self.each(mine, |part| {
+            let own = &progress.parts[part.get()];
+            let (None, Some(mesh)) = (&own.tiles, &own.mesh) else { return Ok(()) };
+            drop_damaged_steps(job, part)?;
+            finish_part(borders, part, &mesh.figures.waiting, None).map(|_| ())
+        })
+    }
+
+    fn levels(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
+        // With this format, the size of all tiles together tells whether one file holds them.
+        let needs_all = job.plan.options.output.format == OutputFormat::Glb;
+        let needs = |part: PartIndex| needs_all || mine.contains(&part);
+        let progress = JobProgressByPart::of_parts(self.job, needs)?;
+        let joined = self.joined(job)?;
+        progress.require(Phase::Tiles, self.task.count, needs)?;
+        let has_tileset = wants_tileset(job.plan, &tiles_of(&progress.parts));
+        let stores = &PartStores::new(job.directory, job.job_id);
+        self.each(mine, |part| {
+            if progress.parts[part.get()].levels.is_some() {
+                return Ok(());
+            }
+            drop_damaged_steps(job, part)?;
+            levels_of_part(job, stores, &joined, part, has_tileset).map(|_| ())
+        })
+    }
+
+    fn joined(&self, job: &PartsJob) -> Result<JoinedParts> {
+        JoinedParts::open(job)?.ok_or_else(|| too_early(Phase::Join, &[1], 1))
+    }
+}
+
+/// Returns the totals over all tiles that are written.
+fn tiles_of(parts: &[PartProgress]) -> TileStats {
+    let mut all = TileStats::default();
+    for part in parts {
+        part.mesh.iter().for_each(|mesh| all += mesh.figures.tiles);
+        part.tiles.iter().for_each(|tiles| all += tiles.figures);
+    }
+    all
+}

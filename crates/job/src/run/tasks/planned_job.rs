@@ -1,0 +1,80 @@
+//! The job that the phase plan has left, as tasks find it.
+
+use crate::durable::directory::JobDirectory;
+use crate::durable::journal;
+use crate::options::JobOptions;
+use crate::partition::parts::Parts;
+use crate::plan::fingerprint::{JobHeader, PLAN_AGAIN};
+use crate::plan::input_identity::InputChange;
+use crate::plan::inputs::input_paths;
+use crate::plan::job_plan::Plan;
+use crate::records::{JobStep, StepRecord};
+use sys::{Error, Result, disk};
+
+/// A job of several parts that is planned.
+pub(crate) struct PlannedJob {
+    pub(crate) directory: JobDirectory,
+    pub(crate) header: JobHeader,
+    pub(crate) plan: Plan,
+    pub(crate) parts: Parts,
+    /// Whether all results are written, so that only their places are left to take.
+    pub(crate) is_complete: bool,
+}
+
+impl PlannedJob {
+    /// Opens the plan in the job directory; `None` if there is none of a job of several parts, or only one from before `submission`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the options have changed since; [`Error::Io`] or [`Error::Broken`] on the plan.
+    pub(crate) fn open(directory: &JobDirectory, options: &JobOptions, submission: u64) -> Result<Option<PlannedJob>> {
+        let Some((header, is_complete)) = planned(directory, submission)? else { return Ok(None) };
+        if let Some(what) = header.fingerprint.changed_options(options)? {
+            return Err(Error::Config(format!("{what}: changed since the job was planned; {PLAN_AGAIN}")));
+        }
+        let plan = Plan { options: options.clone(), ..Plan::read(&directory.plan())? };
+        Ok(Some(PlannedJob { directory: directory.clone(), header, parts: Parts::of(&plan), plan, is_complete }))
+    }
+
+    /// Checks that the inputs of these numbers are those that were planned, and calls them what they are called by now.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if one has changed, [`Error::Io`] if one cannot be read.
+    pub(crate) fn find_inputs(&mut self, inputs: impl Iterator<Item = usize>) -> Result<()> {
+        let renamed = self.header.fingerprint.present_names(&input_paths(&self.plan.options.input)?);
+        let renamed =
+            renamed.ok_or_else(|| Error::Config(format!("[input] files names other files now; {PLAN_AGAIN}")))?;
+        let known: Vec<_> = self.plan.inputs.iter().map(|input| input.source.path.clone()).collect();
+        self.plan.rename_inputs(&renamed);
+        for input in inputs {
+            let now = &self.plan.inputs[input].source.path;
+            let what = match self.header.change_of(&known[input], now)? {
+                InputChange::Nothing => continue,
+                InputChange::Content => format!("has changed since the job was planned; {PLAN_AGAIN}"),
+                InputChange::Time => format!("was modified after the job was planned; {PLAN_AGAIN}"),
+            };
+            return Err(Error::Config(format!("{} {what}", now.display())));
+        }
+        Ok(())
+    }
+}
+
+/// Returns the header of the planned job of several parts in the job directory, and whether all its results are written. A plan from before
+/// `submission` does not count.
+///
+/// # Errors
+/// [`Error::Io`] if its journal cannot be read.
+pub(crate) fn planned(directory: &JobDirectory, submission: u64) -> Result<Option<(JobHeader, bool)>> {
+    // Other machines may have made the folders.
+    directory.look()?;
+    disk::list(&directory.parts()).map_err(Error::io("read", directory.parts()))?;
+    let wanted = |step| matches!(step, JobStep::Plan | JobStep::Report);
+    let read = journal::read_steps::<JobHeader, JobStep, StepRecord>(directory, wanted)?;
+    let Some((Some(header), entries)) = read else { return Ok(None) };
+    let is_planned = |step: JobStep| entries.iter().any(|entry| entry.step == step);
+    let mut own = entries.iter().flat_map(|entry| &entry.files).filter(|file| !directory.is_result(&file.name));
+    let is_planned_and_whole = header.id != 0
+        && header.submission >= submission
+        && is_planned(JobStep::Plan)
+        && own.try_fold(true, |all, file| Ok::<_, Error>(all && file.try_is_whole(directory)?))?;
+    Ok(is_planned_and_whole.then(|| (header, is_planned(JobStep::Report))))
+}

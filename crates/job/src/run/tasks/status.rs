@@ -1,0 +1,57 @@
+//! How far a job is.
+
+use crate::durable::directory::JobDirectory;
+use crate::index::PartIndex;
+use crate::options::JobOptions;
+use crate::phase::Phase;
+use crate::report::job_report::SlowestPart;
+use crate::report::job_status::{JobState, JobStatus, PhaseStatus};
+use crate::run::alone::Alone;
+use crate::run::finished::InPlace;
+use crate::run::tasks::finished_job::in_place;
+use crate::run::tasks::missing::JobProgressByPart;
+use crate::run::tasks::planned_job::PlannedJob;
+use sys::Result;
+
+/// Returns how far the job is.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the job directory, [`Error::Config`] if the options have changed since it was planned.
+pub(crate) fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStatus> {
+    let directory = JobDirectory::new(&options.output.directory);
+    let output = options.output.directory.clone();
+    let simple = |state| JobStatus { output: output.clone(), state, phases: Vec::new(), slowest_part: None };
+    if Alone::find(&directory, 0)?.is_some() {
+        return Ok(simple(JobState::LeftToPublish));
+    }
+    let without_plan = match in_place(&directory, options, 0)? {
+        InPlace::ThisJob(_) => return Ok(simple(JobState::Done)),
+        InPlace::OtherJob => JobState::OtherResults,
+        InPlace::Nothing => JobState::NotPlanned,
+    };
+    let Some(job) = PlannedJob::open(&directory, options, 0)? else { return Ok(simple(without_plan)) };
+    let progress = JobProgressByPart::of(&job)?;
+    let phases = Phase::ALL.map(|phase| phase_status(&progress, phase, tasks)).to_vec();
+    Ok(JobStatus { phases, slowest_part: slowest(&progress), ..simple(JobState::UnderWay) })
+}
+
+fn phase_status(progress: &JobProgressByPart, phase: Phase, tasks: Option<u32>) -> PhaseStatus {
+    let missing_tasks = tasks.map(|tasks| progress.missing_tasks(phase, tasks));
+    if !phase.is_by_part() {
+        let done = u64::from(progress.is_done(phase));
+        return PhaseStatus { phase, done, of: 1, missing_parts: Vec::new(), missing_tasks };
+    }
+    let missing_parts: Vec<u32> = progress.missing(phase, 1).into_iter().map(|(part, _)| part.0).collect();
+    let of = progress.parts_of(phase);
+    PhaseStatus { phase, done: of - missing_parts.len() as u64, of, missing_parts, missing_tasks }
+}
+
+fn slowest(progress: &JobProgressByPart) -> Option<SlowestPart> {
+    let seconds = progress.parts.iter().map(|part| part.seconds());
+    let (part, seconds) =
+        seconds.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, seconds)| *seconds > 0.0)?;
+    let index = PartIndex::new(part);
+    let expected = progress.job.parts.expected_points(index);
+    let points = progress.parts[part].mesh.as_ref().map_or(expected, |mesh| mesh.figures.points);
+    Some(SlowestPart { part: part as u64, seconds, points })
+}

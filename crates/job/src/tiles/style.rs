@@ -1,0 +1,120 @@
+//! How the tiles of a job look. All tiles have one style, so that they fit together.
+
+use crate::mesh::hull_rule::HullRule;
+use crate::plan::job_plan::Plan;
+use crate::tiles::max_edge::MaxEdgeRule;
+use breaklines::Breaklines;
+use delaunay::geometry::Bounds;
+use std::sync::Arc;
+use sys::Result;
+use tiles::Compression;
+use tiles::attributes::AttributeChoice;
+use tiles::color::{Coloring, HeightRange};
+use tiles::compression::CompressionChoice;
+use tiles::curvature::Curvature;
+use tiles::frame::Frame;
+use tiles::options::{ColorChoice, Hull, OutputOptions};
+
+/// How tiles look.
+#[derive(Debug)]
+pub struct TileStyle {
+    /// Where lattice integers lie in a glTF scene.
+    pub frame: Frame,
+    /// Where colours come from; `None` for no colours.
+    pub coloring: Option<Coloring>,
+    /// What vertices carry of their points.
+    pub attributes: AttributeChoice,
+    /// Whether vertices carry normals.
+    pub normals: bool,
+    /// How tiles are packed.
+    pub compression: Compression,
+    /// Which triangles are left out, unless they are flat water.
+    pub max_edge: MaxEdgeRule,
+    /// The breaklines, which stay in coarser tiles, and whose flat water is never left out; `None` without any.
+    pub lines: Option<Arc<Breaklines>>,
+    /// Which triangles are slivers along the hull, which are left out too; `None` if they stay.
+    pub hull: Option<HullRule>,
+    /// Whose the data are, if the user says.
+    pub copyright: Option<String>,
+}
+
+/// Returns the frame with the steps of tiles that are packed like this and lie within `bounds`.
+fn with_steps(frame: Frame, compression: Compression, bounds: Bounds<3>) -> Frame {
+    match compression {
+        Compression::None => frame.refined(bounds),
+        Compression::Meshopt | Compression::Quantized => frame.packed(),
+    }
+}
+
+/// Returns how the tiles of a job are packed whose scene is bent like this.
+pub(crate) fn packing(output: &OutputOptions, curvature: Option<&Curvature>) -> Compression {
+    match (output.compression, curvature) {
+        // Only viewers of 3D Tiles see such a scene, and they know meshopt. What reads quantized tiles takes x and y as they are.
+        (CompressionChoice::Auto, Some(bent)) if !bent.is_vertical() => Compression::Meshopt,
+        _ => output.packing(),
+    }
+}
+
+/// Returns the frame of the tiles of a job whose scene follows the curve of the earth, and whose points are within `bounds`.
+pub(crate) fn bent_frame(plan: &Plan, curvature: Curvature, bounds: Bounds<3>) -> Frame {
+    let packing = packing(&plan.options.output, Some(&curvature));
+    with_steps(plan.frame.clone().curved(curvature), packing, bounds)
+}
+
+impl TileStyle {
+    /// Returns the style of the tiles of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`. A ramp of colours
+    /// spans `heights`.
+    ///
+    /// # Errors
+    /// Those of [`Plan::built_breaklines`].
+    pub fn new(
+        plan: &Plan,
+        max_rgb: u16,
+        bounds: Bounds<3>,
+        heights: HeightRange,
+        max_edge: MaxEdgeRule,
+    ) -> Result<TileStyle> {
+        let output = &plan.options.output;
+        let coloring = match output.color {
+            ColorChoice::None => None,
+            ColorChoice::Class => Some(Coloring::Class),
+            ColorChoice::Elevation => Some(Coloring::Elevation(heights)),
+            ColorChoice::Auto | ColorChoice::Rgb if max_rgb == 0 => Some(Coloring::Elevation(heights)),
+            ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
+        };
+        let compression = packing(output, plan.curvature.as_ref());
+        let frame = match &plan.curvature {
+            Some(curvature) => bent_frame(plan, curvature.clone(), bounds),
+            None => with_steps(plan.frame.clone(), compression, bounds),
+        };
+        let hull = (output.hull == Hull::Trimmed).then(|| HullRule::of(plan));
+        let copyright = output.copyright().map(str::to_owned);
+        let OutputOptions { attributes, normals, .. } = *output;
+        let lines = plan.built_breaklines()?;
+        Ok(TileStyle { frame, coloring, attributes, normals, compression, max_edge, lines, hull, copyright })
+    }
+
+    /// Tells whether the triangle with these corners is left out because it is long. A lake has no points, and a river often has none, so
+    /// the triangles of their water are long.
+    #[inline]
+    pub fn leaves_out(&self, corners: [[i32; 3]; 3]) -> bool {
+        let places = corners.map(|[x, y, _]| [x, y]);
+        let is_water = |lines: &Arc<Breaklines>| lines.is_water(places) || lines.is_between_shores(places);
+        self.max_edge.leaves_out(corners) && !self.lines.as_ref().is_some_and(is_water)
+    }
+
+    /// Removes the triangles that are left out because they are long from `triangles` and returns them. Both stay in order.
+    pub fn take_long(&self, positions: &[[i32; 3]], triangles: &mut Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+        if self.max_edge.keeps_all() {
+            return Vec::new();
+        }
+        let (out, kept) = triangles.iter().partition(|t| self.leaves_out(t.map(|v| positions[v as usize])));
+        *triangles = kept;
+        out
+    }
+
+    /// Returns the frame of these tiles in a scene that is not bent. The points of the job are within `bounds`.
+    pub fn flat_frame(&self, plan: &Plan, bounds: Bounds<3>) -> Frame {
+        with_steps(plan.frame.clone(), self.compression, bounds)
+    }
+}

@@ -1,0 +1,71 @@
+//! Point clouds in: what a file holds, and its points on the lattice, chunk by chunk.
+//!
+//! [`open()`] looks at one file and returns a [`Source`]. Its chunks are decoded independently, on any thread. Every record passes
+//! the filter, which applies the [`PointRules`], and [`PointCounts`] says what happened to the records.
+//!
+//! A new file format is a room of its own beside `las` and `text`, and a variant of `PointData` in `source.rs`.
+
+#![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
+
+mod decoded_chunks;
+mod file;
+pub mod histogram;
+pub mod info;
+mod las;
+pub mod lines;
+mod measured;
+mod middle_zone;
+pub mod options;
+mod other_formats;
+mod points;
+mod read_ahead;
+mod remote;
+mod said_crs;
+pub mod samples;
+mod source;
+mod source_transform;
+pub mod surface;
+pub mod surface_doubts;
+mod text;
+pub mod transform_sources;
+mod transform_warnings;
+pub mod transformation;
+mod windows_1252;
+
+pub use crs::area_of_use::{AreaOfUse, arc};
+pub use crs::choice::CrsChoice;
+pub use crs::datum::Sameness;
+pub use crs::rectangle::turned;
+pub use crs::system::{ComparableCrs, Crs, CrsKind};
+pub use crs::target::{NamedCrs, TargetCrs};
+pub use crs::transform::between::CrsTransform;
+pub use crs::transform::between::DatumNote;
+pub use crs::transform::datum_rule::DatumRule;
+pub use crs::transform::to_globe::GlobeWay;
+pub use crs::unit::Unit;
+pub use crs::unit::same_length;
+pub use crs::vertical::VerticalSystem;
+pub use decoded_chunks::DecodedChunks;
+pub use file::random_access::not_a_file;
+pub use measured::{MeasuredPoints, PlausiblePoints};
+pub use points::axis::Axis;
+pub use points::counts::PointCounts;
+pub use points::kept_heights::KeptHeights;
+pub use points::nodata::{DoubtfulHeight, Extremes, is_nodata_beside, is_number_in_steps, shown_height, who_has};
+pub use points::nodata_choice::NodataChoice;
+pub use points::optional_fields::OptionalFields;
+pub use points::point::Point;
+pub use points::raw_bounds::RawBounds;
+pub use points::raw_box::RawBox;
+pub use points::returns::KeptReturns;
+pub use points::rules::PointRules;
+pub use read_ahead::ReadAhead;
+pub use remote::files::{remote_files, set_network_memory};
+pub use remote::name::is_url;
+pub use remote::traffic::NetworkTraffic;
+pub use source::{FileFormat, Source, open, open_chosen};
+pub use text::options::TextOptions;
+pub use text::outliers::Outliers;
+pub use text::outliers::{Middle, plausible_box};
+pub use text::row_box::RowBox;
+pub use text::row_choice::{RowChoice, TextReading};

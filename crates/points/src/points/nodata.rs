@@ -1,0 +1,564 @@
+//! Heights that stand for "nothing measured" (nodata), such as -9999 in a grid that was written as points. They are told from heights by
+//! their number, and by their distance from all heights.
+
+use serde::{Deserialize, Serialize};
+
+/// The fewest units between a number that stands for nodata and the nearest height.
+const FAR: f64 = 100.0;
+
+/// The fewest metres between any other value that may stand for nodata and the nearest height, at the foot of all heights. The sea lies at the
+/// foot of cliffs, and a lake in a quarry.
+const DOUBTFUL_LOW: f64 = 100.0;
+
+/// The same at the top, where buildings stand out.
+const DOUBTFUL_HIGH: f64 = 500.0;
+
+/// Fewer metres below all others such a value is less doubtful: harbours and lakes have an even surface. It lies at least so many metres below,
+const LEAST_GAP: f64 = 5.0;
+
+/// and so many times as far as all others spread.
+const TIMES_RANGE: f64 = 8.0;
+
+/// A value of a small share of all records, one in so many, may stand for nodata nearer to the others,
+const SHARE: u64 = 10;
+
+/// if so many records have it.
+const LEAST_RECORDS: u64 = 5;
+
+/// It is a usual number for nodata at least so many metres from the nearest other height, since the shore of water lies closer to it, and so many
+/// times as far as all others spread,
+const USUAL_GAP: f64 = 10.0;
+const TIMES_OF_USUAL: f64 = 1.0 / 3.0;
+
+/// or any number so far above all others: a tower may stand out of them. Below, a quarry may lie.
+const TOWER: f64 = 150.0;
+const TIMES_OF_TOWER: f64 = 2.0;
+
+/// Numbers that some programs write for nodata, and that may be heights.
+const USUAL_NUMBERS: [f64; 7] = [0.0, -1.0, -99.0, 255.0, 999.0, 65535.0, 1e6];
+
+/// Heights within so many units of a value are next to it, unless their own range is smaller.
+const NEXT: f64 = 5.0;
+
+/// Such a value is so many times as far from the nearest height as the heights there lie apart: a shore would join it to them.
+const ALONE: f64 = 10.0;
+
+/// A value that fewer records have, at the foot of all heights and at their top, may be a mistake of each, and no mark. Roofs and masts stand
+/// out, and nothing lies that far below.
+const FEW: [u64; 2] = [3, 5];
+
+/// Heights of fewer values do not vary, so the distance of another one from them shows nothing.
+const LEAST_VALUES: usize = 5;
+
+/// How many of the lowest and of the highest values are kept.
+const KEPT: usize = 12;
+
+/// So many records beside a value, below it and above, may be noise that joins it to nothing.
+const STRAYS: u64 = 2;
+
+/// What is among so many records is no noise, but a shore, if fewer than this many times as many share the value.
+const TIMES_STRAYS: u64 = 10;
+
+/// No height is as large, whatever its unit.
+pub(crate) const NO_HEIGHT: f64 = 1e18;
+
+/// The greatest numbers of single and of double precision, half of the first, and the fill value of NetCDF. Programs write them with more or
+/// fewer digits.
+const HUGE_NUMBERS: [f64; 4] = [f32::MAX as f64, f64::MAX, 1.701_411_834_6e38, 9.969_209_968_386_869e36];
+
+/// The ends of 16 and of 32 bits, and those that some programs keep for nodata beside them.
+const ENDS_OF_INTEGERS: [f64; 6] = [-32768.0, -32767.0, 32767.0, -2_147_483_648.0, -2_147_483_647.0, 2_147_483_647.0];
+
+/// Returns whether programs write `value` for nodata: nines alone, the end of a kind of number, or a great power of ten.
+pub(crate) fn is_nodata_number(value: f64) -> bool {
+    let least_digits = if value < 0.0 { 3 } else { 4 };
+    let is_nines = || (least_digits..=15).any(|digits| value.abs() == power_of_ten(digits) - 1.0);
+    let is_end = || HUGE_NUMBERS.into_iter().any(|end| (value.abs() / end - 1.0).abs() < 1e-4);
+    ENDS_OF_INTEGERS.contains(&value) || is_nines() || is_great_power_of_ten(value.abs()) || is_end()
+}
+
+/// Returns whether some programs write `value` for nodata, though it may be a height.
+fn is_usual_number(value: f64) -> bool {
+    USUAL_NUMBERS.contains(&value) || is_nodata_number(value)
+}
+
+fn is_great_power_of_ten(value: f64) -> bool {
+    let power = value.log10().round();
+    value >= 0.999e9 && (value / 10_f64.powf(power) - 1.0).abs() < 1e-9
+}
+
+fn power_of_ten(power: u32) -> f64 {
+    10_i64.checked_pow(power).map_or(f64::INFINITY, |power| power as f64)
+}
+
+/// Returns whether a value that programs write for nodata is none without other heights to compare it with.
+fn stands_for_nodata_alone(value: f64) -> bool {
+    value <= -9999.0 || value.abs() >= power_of_ten(9)
+}
+
+/// A height and who has it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SharedHeight {
+    pub value: f64,
+    /// How many records have it.
+    pub(crate) count: u64,
+    /// The number of the first of them, or of its line.
+    pub(crate) first: u64,
+}
+
+impl SharedHeight {
+    /// Returns whether few of all `records` have this value, and it lies at least `least` below `others`, and so many `times` as far as these
+    /// lie from each other.
+    fn is_set_apart(&self, records: u64, [low, high]: [f64; 2], least: f64, times: f64) -> bool {
+        let is_small_share = self.count >= LEAST_RECORDS && self.count.saturating_mul(SHARE) < records;
+        is_small_share && low - self.value >= least.max(times * (high - low))
+    }
+}
+
+/// The lowest and the highest values of heights, and how many records have each.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Extremes {
+    lowest: Lowest,
+    /// With the other sign.
+    highest: Lowest,
+}
+
+/// The lowest values, ascending.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Lowest(Vec<SharedHeight>);
+
+impl Lowest {
+    #[inline(always)]
+    fn see(&mut self, height: SharedHeight) {
+        let is_higher = |last: &SharedHeight| self.0.len() == KEPT && height.value > last.value;
+        if !self.0.last().is_some_and(is_higher) {
+            self.insert(height);
+        }
+    }
+
+    #[inline(never)]
+    fn insert(&mut self, height: SharedHeight) {
+        match self.0.binary_search_by(|known| known.value.total_cmp(&height.value)) {
+            Ok(at) => {
+                let known = &mut self.0[at];
+                known.count = known.count.saturating_add(height.count);
+                known.first = known.first.min(height.first);
+            }
+            Err(at) => {
+                self.0.insert(at, height);
+                self.0.truncate(KEPT);
+            }
+        }
+    }
+
+    /// Returns the heights that are not numbers for nodata; `None` if there is none.
+    fn rest(&self, is_number: impl Fn(f64) -> bool) -> Option<Vec<SharedHeight>> {
+        let rest: Vec<SharedHeight> = self.0.iter().filter(|height| !is_number(height.value)).copied().collect();
+        (!rest.is_empty()).then_some(rest)
+    }
+}
+
+/// A value that may stand for nodata, though it is none of the numbers that programs write for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DoubtfulHeight {
+    pub height: SharedHeight,
+    /// Where all other heights lie.
+    pub others: [f64; 2],
+}
+
+impl DoubtfulHeight {
+    fn with_other_sign(self) -> DoubtfulHeight {
+        let [low, high] = self.others;
+        let height = SharedHeight { value: 0.0 - self.height.value, ..self.height };
+        DoubtfulHeight { height, others: [0.0 - high, 0.0 - low] }
+    }
+}
+
+/// Which heights stand for nodata.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FoundNodata {
+    pub heights: Vec<SharedHeight>,
+    /// Where all other heights lie; `None` if there is none.
+    pub(crate) others: Option<[f64; 2]>,
+}
+
+impl Extremes {
+    /// Takes the height of record or line `number`.
+    #[inline(always)]
+    pub fn see(&mut self, value: f64, number: u64) {
+        self.see_shared(SharedHeight { value, count: 1, first: number });
+    }
+
+    #[inline(always)]
+    fn see_shared(&mut self, height: SharedHeight) {
+        // -0 is 0.
+        self.lowest.see(SharedHeight { value: height.value + 0.0, ..height });
+        self.highest.see(SharedHeight { value: 0.0 - height.value, ..height });
+    }
+
+    /// Takes the heights of the records after these, whose numbers are counted from `before`.
+    pub(crate) fn add(&mut self, other: &Extremes, before: u64) {
+        let moved = |height: &SharedHeight| SharedHeight { first: height.first.saturating_add(before), ..*height };
+        other.lowest.0.iter().for_each(|height| self.lowest.see(moved(height)));
+        other.highest.0.iter().for_each(|height| self.highest.see(moved(height)));
+    }
+
+    /// Returns these heights with numbers that count from `before`.
+    pub(crate) fn after(&self, before: u64) -> Extremes {
+        let mut moved = Extremes::default();
+        moved.add(self, before);
+        moved
+    }
+
+    /// Returns these heights in other units.
+    pub fn map(&self, to: impl Fn(f64) -> f64) -> Extremes {
+        let map = |lowest: &Lowest, sign: f64| {
+            let moved =
+                lowest.0.iter().map(|height| SharedHeight { value: sign * to(sign * height.value) + 0.0, ..*height });
+            Lowest(moved.collect())
+        };
+        Extremes { lowest: map(&self.lowest, 1.0), highest: map(&self.highest, -1.0) }
+    }
+
+    /// Returns the heights that stand for nodata: those for which `is_number` holds, and which lie farther from all others than these
+    /// from each other, or much farther than the nearest of them do.
+    pub fn nodata(&self, is_number: impl Fn(f64) -> bool + Copy) -> FoundNodata {
+        let high_number = |value: f64| is_number(0.0 - value);
+        let Some((lowest, highest)) = self.lowest.rest(is_number).zip(self.highest.rest(high_number)) else {
+            return self.nodata_alone(is_number);
+        };
+        let is_alone = |value: f64| is_apart_from(&lowest, value, FAR) || is_apart_from(&highest, 0.0 - value, FAR);
+        let (low, high) = (lowest[0].value, highest[0].value);
+        let mut others = [low, 0.0 - high];
+        let restored = self.highest.0.iter().map(|height| SharedHeight { value: 0.0 - height.value, ..*height });
+        let is_outside = |height: &SharedHeight| height.value < low || height.value > 0.0 - high;
+        let mut heights: Vec<SharedHeight> = self.lowest.0.iter().copied().chain(restored).filter(is_outside).collect();
+        // A number among heights is a height, and then the next one may be among them too.
+        let is_near = |value: f64, others: [f64; 2]| !is_far(value, others, FAR) && !is_alone(value);
+        while let Some(near) = heights.iter().position(|height| is_near(height.value, others)) {
+            let SharedHeight { value, .. } = heights.swap_remove(near);
+            others = [others[0].min(value), others[1].max(value)];
+        }
+        heights.sort_unstable_by(|a, b| a.value.total_cmp(&b.value));
+        FoundNodata { heights, others: Some(others) }
+    }
+
+    /// Returns the heights that stand for nodata where no other height is known.
+    fn nodata_alone(&self, is_number: impl Fn(f64) -> bool) -> FoundNodata {
+        let is_nodata = |height: &SharedHeight| is_number(height.value) && stands_for_nodata_alone(height.value);
+        let (heights, others): (Vec<_>, Vec<_>) = self.lowest.0.iter().partition(|height| is_nodata(height));
+        let others = others.first().map(|low: &SharedHeight| {
+            let high = others.last().map_or(low.value, |high| high.value);
+            [low.value, high]
+        });
+        FoundNodata { heights, others }
+    }
+
+    /// Returns the lowest or the highest value if several records share it, and nothing joins it to the other heights: it lies farther from
+    /// them than they lie from each other, or, at their foot, much farther than the nearest of them do. It may stand for nodata, such as 0
+    /// among mountains. A unit of heights is so many `metres`.
+    pub fn doubtful(&self, metres: f64) -> Option<DoubtfulHeight> {
+        let [few_low, few_high] = FEW;
+        let [least_low, least_high] = [DOUBTFUL_LOW, DOUBTFUL_HIGH].map(|least| least / metres);
+        let low = self.lowest.doubtful(&self.highest, few_low, |height, above, others| {
+            is_apart_from(above, height.value, least_low) || is_far(height.value, others, least_low)
+        });
+        let high = || {
+            self.highest.doubtful(&self.lowest, few_high, |height, _, others| is_far(height.value, others, least_high))
+        };
+        low.or_else(|| high().map(DoubtfulHeight::with_other_sign))
+    }
+
+    /// Returns the lowest value if several records share it, and it lies below all others by many times their range, or the lowest or the
+    /// highest that few of all `records` share, and that lies apart. Nearer than a [`Extremes::doubtful`] one, it may be water, or a roof.
+    pub fn set_apart(&self, metres: f64, records: u64) -> Option<DoubtfulHeight> {
+        let [usual_gap, tower] = [USUAL_GAP, TOWER].map(|gap| gap / metres);
+        let is_usual = |height: &SharedHeight, value: f64, others: [f64; 2]| {
+            is_usual_number(value) && height.is_set_apart(records, others, usual_gap, TIMES_OF_USUAL)
+        };
+        let low = self.lowest.doubtful(&self.highest, FEW[0], |height, _, others| {
+            let gap = others[0] - height.value;
+            let is_deep = gap * metres >= LEAST_GAP && gap >= TIMES_RANGE * (others[1] - others[0]);
+            is_deep || is_usual(height, height.value, others)
+        });
+        let high = || {
+            self.highest.doubtful(&self.lowest, FEW[1], |height, _, others| {
+                is_usual(height, 0.0 - height.value, others)
+                    || height.is_set_apart(records, others, tower, TIMES_OF_TOWER)
+            })
+        };
+        low.or_else(|| high().map(DoubtfulHeight::with_other_sign))
+    }
+
+    /// Returns warnings about the heights of records that the user takes for nodata, and that other heights of the file are next to.
+    pub(crate) fn next_to(&self, others: &Extremes, record: &str) -> Vec<String> {
+        let (Some(low), Some(high)) = (others.lowest.0.first(), others.highest.0.first()) else { return Vec::new() };
+        let range = [low.value, 0.0 - high.value];
+        let is_next = |value: f64| {
+            let is_apart = is_apart_from(&others.lowest.0, value, NEXT);
+            !is_apart && !is_apart_from(&others.highest.0, 0.0 - value, NEXT) && !is_far(value, range, 0.0)
+        };
+        self.lowest
+            .0
+            .iter()
+            .filter(|height| is_next(height.value))
+            .map(|height| real_nodata(height, range, record))
+            .collect()
+    }
+}
+
+impl Lowest {
+    /// Returns the first value that `few` records share, apart from a few strays below, if it is apart from those above it and from `others`,
+    /// the range of these. `top` has the greatest values with the other sign.
+    fn doubtful(
+        &self,
+        top: &Lowest,
+        few: u64,
+        is_apart: impl Fn(&SharedHeight, &[SharedHeight], [f64; 2]) -> bool,
+    ) -> Option<DoubtfulHeight> {
+        let greatest = 0.0 - top.0.first()?.value;
+        let is_shared = |(at, height): &(usize, &SharedHeight)| {
+            let strays = records(&self.0[..*at]);
+            strays <= STRAYS && height.count >= few.max(TIMES_STRAYS * strays)
+        };
+        let (at, height) = self.0.iter().enumerate().find(is_shared)?;
+        let above = &self.0[at + 1..];
+        let others = [above.first()?.value, greatest];
+        let is_doubtful = above.len() >= LEAST_VALUES && is_apart(height, above, others);
+        is_doubtful.then_some(DoubtfulHeight { height: *height, others })
+    }
+}
+
+/// Returns the number of records that have these heights.
+fn records(heights: &[SharedHeight]) -> u64 {
+    heights.iter().map(|height| height.count).sum()
+}
+
+/// Returns whether `value` lies at least so far below the lowest `heights`, which are ascending, and much farther than these lie from each
+/// other. A few strays may lie between.
+fn is_apart_from(heights: &[SharedHeight], value: f64, least: f64) -> bool {
+    (0..heights.len()).take_while(|&strays| records(&heights[..strays]) <= STRAYS).any(|strays| {
+        let body = &heights[strays..];
+        let is_enough = strays == 0 || body.len() >= LEAST_VALUES;
+        match (body.first(), body.last()) {
+            (Some(first), Some(last)) if is_enough => {
+                first.value - value > least.max(ALONE * (last.value - first.value))
+            }
+            _ => false,
+        }
+    })
+}
+
+/// Returns whether `value` lies farther from all of `others` than these from each other, and at least so far.
+pub(crate) fn is_far(value: f64, [low, high]: [f64; 2], least: f64) -> bool {
+    (low - value).max(value - high) > (high - low).max(least)
+}
+
+/// Returns whether `value` is a number for nodata and lies far from all of `others`.
+pub fn is_nodata_beside(value: f64, step: f64, others: [f64; 2]) -> bool {
+    is_number_in_steps(value, step) && is_far(value, others, FAR)
+}
+
+/// Returns whether `value`, in steps of so many units, is as near to a number for nodata as it can be.
+pub fn is_number_in_steps(value: f64, step: f64) -> bool {
+    let whole = value.round();
+    is_nodata_number(whole) && (value - whole).abs() <= 0.501 * step
+}
+
+/// Returns a height as people write it.
+pub fn shown_height(value: f64) -> String {
+    if value.abs() >= NO_HEIGHT { format!("{value:e}") } else { value.to_string() }
+}
+
+/// Returns how many records have a height, and which is the first of them.
+pub fn who_has(SharedHeight { value, count, first }: &SharedHeight, record: &str) -> String {
+    let height = shown_height(*value);
+    match count {
+        1 => format!("{record} {first} has the height {height}"),
+        _ => format!("{count} {record}s have the height {height} (the first is {record} {first})"),
+    }
+}
+
+fn real_nodata(height: &SharedHeight, [low, high]: [f64; 2], record: &str) -> String {
+    format!(
+        "{}, which [input] nodata leaves out, though the other heights of the file, from {low} to {high}, are next to it: such points may be \
+         real, as those of the sea. nodata holds for all files: if they are real, remove it, and the points without a height from the other \
+         files",
+        who_has(height, record)
+    )
+}
+
+/// Returns a warning about a height that stands for nodata. Records of the file are called `record`.
+pub(crate) fn left_out(height: &SharedHeight, record: &str) -> String {
+    // Nothing keeps a height that no lattice holds.
+    let remedy = if height.value.abs() < NO_HEIGHT { "; [input] nodata = \"none\" keeps such points" } else { "" };
+    format!("{}, which stands for nodata, far from all other heights: left out{remedy}", who_has(height, record))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn extremes(heights: impl IntoIterator<Item = f64>) -> Extremes {
+        let mut extremes = Extremes::default();
+        (0..).zip(heights).for_each(|(number, height)| extremes.see(height, number));
+        extremes
+    }
+
+    fn nodata(heights: impl IntoIterator<Item = f64>) -> Vec<f64> {
+        extremes(heights).nodata(is_nodata_number).heights.iter().map(|height| height.value).collect()
+    }
+
+    #[test]
+    fn numbers_for_nodata_are_known() {
+        let known = [
+            -999.0,
+            -9999.0,
+            9999.0,
+            -99999.0,
+            -32768.0,
+            -32767.0,
+            1e20,
+            1e30,
+            -3.4028235e38,
+            -3.40282e38,
+            1.70141e38,
+            9.96921e36,
+            f64::MIN,
+            1e10,
+        ];
+        assert!(known.into_iter().all(is_nodata_number));
+        assert!(
+            ![0.0, -1.0, 999.0, -9998.0, 99.0, -99.0, 10000.0, 32768.0, 8848.0, 1.5e18, -1.234e19]
+                .into_iter()
+                .any(is_nodata_number)
+        );
+    }
+
+    #[test]
+    fn numbers_far_from_all_heights_stand_for_nodata() {
+        let hills = || (0..500).map(|i| 100.0 + f64::from(i % 97));
+        assert_eq!(nodata(hills().chain([-9999.0])), [-9999.0]);
+        assert_eq!(
+            nodata([-9999.0, 9999.0, -32768.0, 1e30].into_iter().chain(hills())),
+            [-32768.0, -9999.0, 9999.0, 1e30]
+        );
+        assert_eq!(nodata(hills()), [0.0; 0]);
+        // Among heights in millimetres it is one.
+        assert_eq!(nodata((0..500).map(|i| -12_000.0 + 30.0 * f64::from(i)).chain([-9999.0])), [0.0; 0]);
+        assert_eq!(nodata((0..500).map(|i| -9990.0 + 30.0 * f64::from(i)).chain([-9999.0])), [0.0; 0]);
+        // A floor at 999 that nothing else is as far from as it is high.
+        assert_eq!(nodata((0..500).map(|i| 300.0 + 2.0 * f64::from(i)).chain([-999.0])), [-999.0]);
+        // In high mountains it is not, but nothing joins it to the lowest of them.
+        assert_eq!(nodata((0..900).map(|i| 300.0 + 2.0 * f64::from(i)).chain([-999.0])), [-999.0]);
+        assert_eq!(
+            nodata((0..900).map(|i| 300.0 + 2.0 * f64::from(i)).chain([-999.0, 40.0, -300.0, -310.0])),
+            [0.0; 0]
+        );
+        assert_eq!(nodata([-9999.0; 7]), [-9999.0]);
+        assert_eq!(nodata([9999.0; 7]), [0.0; 0]);
+        let found = extremes(hills().chain([-9999.0, -9999.0])).nodata(is_nodata_number);
+        assert_eq!(found.heights, [SharedHeight { value: -9999.0, count: 2, first: 500 }]);
+        assert_eq!(found.others, Some([100.0, 196.0]));
+    }
+
+    #[test]
+    fn a_value_that_several_records_share_far_from_all_heights_is_doubtful() {
+        let peaks = || (0..500).map(|i| 1500.0 + f64::from(i % 97));
+        let zeros = |count: usize| std::iter::repeat_n(0.0, count);
+        let doubt = extremes(zeros(7).chain(peaks())).doubtful(1.0).unwrap();
+        assert_eq!((doubt.height.value, doubt.height.count, doubt.others), (0.0, 7, [1500.0, 1596.0]));
+        let doubt = extremes(peaks().chain([5000.0; 9])).doubtful(1.0).unwrap();
+        assert_eq!((doubt.height.value, doubt.height.first), (5000.0, 500));
+        let alps = || (0..5000).map(|i| 800.0 + 0.5 * f64::from(i));
+        assert_eq!(extremes(zeros(5).chain(alps())).doubtful(1.0).map(|doubt| doubt.others), Some([800.0, 3299.5]));
+        assert_eq!(extremes(zeros(3).chain(peaks())).doubtful(1.0).map(|doubt| doubt.height.count), Some(3));
+        assert_eq!(extremes(zeros(2).chain(peaks())).doubtful(1.0), None);
+        // Strays below and between join it to nothing.
+        for strays in [[-40.0, 450.0], [-40.0, -300.0], [450.0, 780.0]] {
+            let doubt = extremes(zeros(100).chain(alps()).chain(strays)).doubtful(1.0);
+            assert_eq!(doubt.map(|doubt| doubt.height.value), Some(0.0), "{strays:?}");
+        }
+        assert_eq!(nodata([-9999.0; 50].into_iter().chain(alps()).chain([-6000.0, -5000.0])), [-9999.0]);
+        // The sea, and a lake with a shore.
+        assert_eq!(extremes(zeros(200).chain((0..400).map(f64::from))).doubtful(1.0), None);
+        assert_eq!(extremes(zeros(200).chain(peaks()).chain([700.0, 750.0, 800.0])).doubtful(1.0), None);
+        assert_eq!(extremes(zeros(200).chain(alps()).chain([1.0, 30.0, 40.0])).doubtful(1.0), None);
+        // The sea at the foot of a cliff, and a tower in a plain.
+        assert_eq!(extremes(zeros(200).chain((0..400).map(|i| 60.0 + f64::from(i) / 50.0))).doubtful(1.0), None);
+        assert_eq!(extremes((0..400).map(|i| f64::from(i) / 50.0).chain([140.0; 9])).doubtful(1.0), None);
+        // A platform and what stands on it.
+        assert_eq!(extremes(zeros(200).chain([100.0, 100.0, 100.5])).doubtful(1.0), None);
+    }
+
+    #[test]
+    fn a_value_many_times_as_far_below_all_heights_as_they_spread_is_set_apart() {
+        let plain = |zeros: usize, from: f64, range: f64| {
+            let others = (0..500).map(move |i| from + range * f64::from(i % 97) / 96.0);
+            extremes(std::iter::repeat_n(0.0, zeros).chain(others))
+        };
+        let value = |found: Option<DoubtfulHeight>| found.map(|doubt| doubt.height.value);
+        assert_eq!(
+            (value(plain(5, 85.0, 10.0).set_apart(1.0, 1_000)), plain(5, 85.0, 10.0).doubtful(1.0)),
+            (Some(0.0), None)
+        );
+        assert_eq!(value(plain(5, 60.0, 2.0).set_apart(1.0, 1_000)), Some(0.0));
+        assert_eq!(value(plain(2, 60.0, 2.0).set_apart(1.0, 1_000)), None);
+        assert_eq!(value(plain(50, 60.0, 8.0).set_apart(1.0, 500)), None);
+        assert_eq!(value(plain(50, 4.0, 0.4).set_apart(1.0, 1_000)), None);
+        // The same in millimetres, and in feet.
+        assert_eq!(value(plain(6, 500.0, 60.0).set_apart(0.001, 1_000)), None);
+        assert_eq!(value(plain(6, 500.0, 60.0).doubtful(0.001)), None);
+        assert_eq!(value(plain(6, 500.0, 60.0).doubtful(0.3048)), Some(0.0));
+        assert_eq!(value(plain(6, 300.0, 60.0).doubtful(0.3048)), None);
+    }
+
+    #[test]
+    fn a_value_of_few_records_that_lies_apart_for_the_range_of_the_others_is_set_apart() {
+        let hills = |mark: f64, count: usize, from: f64, range: f64| {
+            let others = (0..900).map(move |i| from + range * f64::from(i % 97) / 96.0);
+            let found = extremes(std::iter::repeat_n(mark, count).chain(others)).set_apart(1.0, 1_000);
+            found.map(|doubt| (doubt.height.value, doubt.others))
+        };
+        assert_eq!(hills(0.0, 60, 28.0, 42.0), Some((0.0, [28.0, 70.0])));
+        assert_eq!(hills(255.0, 60, 17.0, 32.0), Some((255.0, [17.0, 49.0])));
+        assert_eq!(hills(400.0, 60, 17.0, 32.0), Some((400.0, [17.0, 49.0])));
+        assert_eq!(hills(-1.0, 60, 67.0, 32.0), Some((-1.0, [67.0, 99.0])));
+        assert_eq!(hills(0.0, 60, -70.0, 42.0), Some((0.0, [-70.0, -28.0])));
+        // Near for the range of the others, or at all, or of few records, or of many.
+        for (mark, count, from, range) in [
+            (0.0, 60, 28.0, 96.0),
+            (0.0, 60, 9.0, 3.0),
+            (0.0, 4, 28.0, 42.0),
+            (0.0, 100, 28.0, 42.0),
+            // No usual number: the floor of a quarry, and a tower.
+            (560.0, 60, 700.0, 20.0),
+            (149.0, 60, 0.0, 20.0),
+        ] {
+            assert_eq!(hills(mark, count, from, range), None, "{mark} {count} {from} {range}");
+        }
+    }
+
+    #[test]
+    fn nodata_of_the_user_next_to_other_heights_is_told() {
+        let zeros = || extremes([0.0; 9]);
+        let coast = extremes((0..500).map(|i| 0.2 + 0.1 * f64::from(i)));
+        let told = zeros().next_to(&coast, "point");
+        assert!(told.len() == 1 && told[0].starts_with("9 points have the height 0 "), "{told:?}");
+        for from in [60.0, 900.0] {
+            let hills = extremes((0..500).map(|i| from + 0.1 * f64::from(i)));
+            assert!(zeros().next_to(&hills, "point").is_empty());
+        }
+        assert!(extremes([]).next_to(&coast, "point").is_empty());
+    }
+
+    #[test]
+    fn extremes_of_parts_are_those_of_the_whole() {
+        let heights: Vec<f64> = (0..1000).map(|i| f64::from((i * 7919) % 353) - 50.0).collect();
+        let mut parts = Extremes::default();
+        for (number, part) in (0..).zip(heights.chunks(100)) {
+            parts.add(&extremes(part.iter().copied()), number * 100);
+        }
+        assert_eq!(parts, extremes(heights));
+    }
+}

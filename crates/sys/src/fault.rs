@@ -1,0 +1,170 @@
+//! Faults on purpose: tests kill the process at places where a kill could do harm, let reads fail, and have every change of a file
+//! written down. CONTRIBUTING.md says how.
+//!
+//! Only builds with the feature `fault-injection` look for them. In all other builds these functions do nothing and read no
+//! environment variable.
+
+use std::io;
+
+/// Ends the process like `kill -9`: nothing is flushed, nothing is cleaned up.
+pub fn die() -> ! {
+    #[cfg(unix)]
+    let _ = signal_hook::low_level::raise(signal_hook::consts::SIGKILL);
+    std::process::abort()
+}
+
+/// Marks a place where a test may kill the process.
+pub fn point(name: &str) {
+    mark(name);
+    if is_due(name) {
+        die();
+    }
+}
+
+/// Marks a place that reads from a disk, or asks what is there, which a test may let fail as a broken disk does.
+pub fn read(name: &str) -> io::Result<()> {
+    if is_due(name) { Err(io::Error::from_raw_os_error(EIO)) } else { Ok(()) }
+}
+
+/// "Input/output error".
+const EIO: i32 = 5;
+
+#[cfg(feature = "remote")]
+pub use injection::network_patience;
+pub use injection::{commit_interval, is_due, is_signalled, mark, processors, traced};
+
+#[cfg(feature = "fault-injection")]
+mod injection {
+    use std::fs::File;
+    use std::io::{self, Write};
+    use std::panic::Location;
+    use std::path::Path;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use std::sync::{LazyLock, Mutex, PoisonError};
+    use std::time::Duration;
+
+    /// `GDT_FAULT=name:n` makes the process fail when it comes to the place of that name for the n-th time; `name:n+` also at every
+    /// later time.
+    struct RequestedFault {
+        name: String,
+        count: u64,
+        and_later: bool,
+        visits: AtomicU64,
+    }
+
+    static REQUESTED: LazyLock<Option<RequestedFault>> = LazyLock::new(|| {
+        let text = std::env::var("GDT_FAULT").ok()?;
+        let (name, count) = text.split_once(':')?;
+        let and_later = count.ends_with('+');
+        let count = count.trim_end_matches('+').parse().ok()?;
+        Some(RequestedFault { name: name.into(), count, and_later, visits: AtomicU64::new(0) })
+    });
+
+    /// Counts a visit to the place called `name` and returns whether the process must fail there this time.
+    pub fn is_due(name: &str) -> bool {
+        REQUESTED.as_ref().is_some_and(|fault| {
+            fault.name == name && {
+                let visit = fault.visits.fetch_add(1, Ordering::Relaxed) + 1;
+                visit == fault.count || fault.and_later && visit > fault.count
+            }
+        })
+    }
+
+    /// Returns whether a test has a signal come now that this place asks for one. All places in a file have one name.
+    pub fn is_signalled(place: &Location) -> bool {
+        let file = Path::new(place.file()).file_stem().unwrap_or_default();
+        REQUESTED.is_some() && is_due(&format!("signal-{}", file.display()))
+    }
+
+    /// Returns the least time between two commits of the journal if a test sets it (`GDT_COMMIT_MS`).
+    pub fn commit_interval() -> Option<Duration> {
+        std::env::var("GDT_COMMIT_MS").ok()?.parse().ok().map(Duration::from_millis)
+    }
+
+    /// Returns how long servers may be silent if a test sets it (`GDT_PATIENCE_MS`).
+    #[cfg(feature = "remote")]
+    pub fn network_patience() -> Option<Duration> {
+        std::env::var("GDT_PATIENCE_MS").ok()?.parse().ok().map(Duration::from_millis)
+    }
+
+    /// Returns the number of processors if a test sets it (`GDT_PROCESSORS`).
+    pub fn processors() -> Option<usize> {
+        std::env::var("GDT_PROCESSORS").ok()?.parse().ok()
+    }
+
+    /// The file in which all changes of files are written down (`GDT_TRACE`).
+    static TRACE: LazyLock<Option<Mutex<File>>> =
+        LazyLock::new(|| std::env::var_os("GDT_TRACE").and_then(|path| File::create(path).ok()).map(Mutex::new));
+
+    /// Does a change, unless it must fail, and writes it down.
+    pub fn traced<'a, T>(
+        change: impl FnOnce() -> io::Result<T>,
+        describe: impl FnOnce(&T) -> (String, &'a [u8]),
+    ) -> io::Result<T> {
+        written_down(|| super::read("change").and_then(|()| change()), describe)
+    }
+
+    /// Does a change and writes it down: a line, and the bytes that it announces. One change at a time, so that the order is the
+    /// true one.
+    fn written_down<'a, T>(
+        change: impl FnOnce() -> io::Result<T>,
+        describe: impl FnOnce(&T) -> (String, &'a [u8]),
+    ) -> io::Result<T> {
+        let Some(trace) = TRACE.as_ref() else { return change() };
+        let mut trace = trace.lock().unwrap_or_else(PoisonError::into_inner);
+        let done = change()?;
+        let (line, bytes) = describe(&done);
+        trace.write_all(&[line.as_bytes(), b"\n", bytes].concat())?;
+        Ok(done)
+    }
+
+    /// Writes down that the process came to the place called `name`.
+    pub fn mark(name: &str) {
+        // Only the tests read the trace, and they notice if it is cut off.
+        let _ = written_down(|| Ok(()), |()| (format!("mark {name}"), &[]));
+    }
+}
+
+#[cfg(not(feature = "fault-injection"))]
+mod injection {
+    use std::io;
+    use std::panic::Location;
+    use std::time::Duration;
+
+    #[inline(always)]
+    pub fn is_due(_: &str) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    pub fn is_signalled(_: &Location) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    pub fn commit_interval() -> Option<Duration> {
+        None
+    }
+
+    #[cfg(feature = "remote")]
+    #[inline(always)]
+    pub fn network_patience() -> Option<Duration> {
+        None
+    }
+
+    #[inline(always)]
+    pub fn processors() -> Option<usize> {
+        None
+    }
+
+    #[inline(always)]
+    pub fn traced<'a, T>(
+        change: impl FnOnce() -> io::Result<T>,
+        _: impl FnOnce(&T) -> (String, &'a [u8]),
+    ) -> io::Result<T> {
+        change()
+    }
+
+    #[inline(always)]
+    pub fn mark(_: &str) {}
+}

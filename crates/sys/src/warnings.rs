@@ -1,0 +1,60 @@
+//! Warnings: what a user should know although the job goes on.
+
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Warnings in the order in which they were found. Each is a full sentence without a final full stop.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Warnings(Vec<String>);
+
+impl Warnings {
+    /// Adds a warning.
+    pub fn push(&mut self, warning: impl Into<String>) {
+        self.0.push(warning.into());
+    }
+
+    /// Adds the warnings about the file at `path`, each with the path before it.
+    pub fn extend_from_file(&mut self, path: &Path, warnings: &Warnings) {
+        self.0.extend(warnings.0.iter().map(|warning| format!("{}: {warning}", path.display())));
+    }
+
+    /// Keeps the first `most` warnings and adds one that says how many more there were: thousands would hide the others.
+    pub fn shorten(&mut self, most: usize) {
+        if self.0.len() > most {
+            let more = self.0.len() - most;
+            self.0.truncate(most);
+            self.0.push(format!("... and {more} more warnings about the inputs"));
+        }
+    }
+
+    /// Returns all warnings.
+    pub fn iter(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(String::as_str)
+    }
+
+    /// Returns all warnings, to be changed.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut String> {
+        self.0.iter_mut()
+    }
+
+    /// Returns whether there are no warnings.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl Extend<String> for Warnings {
+    fn extend<I: IntoIterator<Item = String>>(&mut self, warnings: I) {
+        self.0.extend(warnings);
+    }
+}
+
+impl IntoIterator for Warnings {
+    type Item = String;
+    type IntoIter = std::vec::IntoIter<String>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter()
+    }
+}

@@ -1,0 +1,305 @@
+//! The vertical distance between a simplified terrain and the one that it was made of: the greatest value over all of the ground, not
+//! a sample.
+//!
+//! The simplified terrain has some vertices of the other, but their heights may differ. Both terrains are linear over every triangle.
+//! So their difference is linear over every piece that the two sets of edges together cut the ground into, and it is greatest at a
+//! corner of such a piece. A corner is a vertex of the fine mesh (the vertices of the
+//! coarse mesh are among them), or a place where a fine and a coarse edge cross. `FineMesh` finds the crossings by walking along a
+//! coarse edge through the fine mesh, and `VertexCells` finds the fine vertices in a coarse triangle. `HeightBounds` bounds the
+//! error of a coarse triangle in advance, so that few triangles need this.
+
+use crate::lod::filling::CoarseMesh;
+use crate::lod::height_bounds::HeightBounds;
+use crate::lod::vertex_cells::{VertexCells, plane};
+use delaunay::geometry::predicates::orient2d;
+use delaunay::mesh::adjacency::VertexAdjacency;
+
+/// Steps of a walk along an edge, on average. A mesh that needs more has nothing but slivers, and gets a rougher bound.
+const STEPS_PER_EDGE: u64 = 64;
+
+/// Looking through this many triangles around a vertex counts as a step. Few vertices have as many, but the hub of a fan may have all.
+const TRIANGLES_PER_STEP: u64 = 8;
+
+/// The number of triangles that are measured first. On LiDAR hardly any of the others can have a greater error.
+const MEASURED_FIRST: usize = 1024;
+
+/// What rounding loses of the range of heights, and more.
+const LOST: f64 = 1.0 / (1u64 << 48) as f64;
+
+/// Returns the greatest vertical distance in steps of z between two terrains. It is never too small. The triangles `fine` are between
+/// `positions` (lattice x, y, z), and those of `coarse` between some of them, with other heights within the same range. Both terrains
+/// must cover the same ground once, with counterclockwise triangles.
+pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &CoarseMesh) -> f64 {
+    let heights = HeightBounds::new(positions, fine);
+    let corners = |triangle: &[u32; 3]| triangle.map(|v| coarse.positions[v as usize]);
+    let mut bounds: Vec<(u32, u32)> =
+        coarse.triangles.iter().map(|t| heights.error_bound(&corners(t))).zip(0..).collect();
+    // Triangles that may have the greatest error come first, so that most of the others can be skipped.
+    let first = MEASURED_FIRST.min(bounds.len());
+    if first < bounds.len() {
+        bounds.select_nth_unstable_by(first, |a, b| b.cmp(a));
+    }
+    let mut steps = StepsLeft::new(coarse.triangles.len());
+    let mut greatest = 0.0f64;
+    let (first, others) = bounds.split_at(first);
+    for bounds in [first, others] {
+        let mut measured: Vec<_> = bounds.iter().filter(|(bound, _)| *bound as f64 > greatest).copied().collect();
+        if measured.is_empty() {
+            continue;
+        }
+        measured.sort_unstable_by(|a, b| b.cmp(a));
+        let triangles = || measured.iter().map(|(_, triangle)| coarse.triangles[*triangle as usize]);
+        let near = NearTerrain::new(&heights, positions, fine, triangles().map(|t| corners(&t)));
+        for ((bound, _), triangle) in measured.iter().zip(triangles()) {
+            if *bound as f64 > greatest {
+                match near.error_of(triangle.map(|v| coarse.vertices[v as usize]), &corners(&triangle), &mut steps) {
+                    Some(error) => greatest = greatest.max(error),
+                    None => return heights.height_range(),
+                }
+            }
+        }
+    }
+    // Rounding loses about 2^-50 of a height.
+    let range = heights.height_range();
+    let lost = 1e-9 + range * LOST;
+    if greatest > 0.0 { (greatest + lost).min(range.max(greatest)) } else { 0.0 }
+}
+
+/// How much work is left before a rougher bound must do.
+struct StepsLeft {
+    of_walks: u64,
+    of_vertices: u64,
+}
+
+impl StepsLeft {
+    /// Returns the steps for a terrain of so many simplified triangles.
+    fn new(coarse: usize) -> StepsLeft {
+        let of_walks = STEPS_PER_EDGE * (3 * coarse as u64 + 1000);
+        StepsLeft { of_walks, of_vertices: VertexCells::steps_for(coarse) }
+    }
+}
+
+/// What of the terrain is near the simplified triangles that are measured.
+struct NearTerrain<'a> {
+    mesh: FineMesh<'a>,
+    vertices: VertexCells,
+}
+
+impl<'a> NearTerrain<'a> {
+    fn new(
+        heights: &HeightBounds,
+        positions: &'a [[i32; 3]],
+        fine: &[[u32; 3]],
+        measured: impl Iterator<Item = [[i32; 3]; 3]>,
+    ) -> NearTerrain<'a> {
+        let (vertices, triangles) = heights.near(positions, fine, measured);
+        NearTerrain { mesh: FineMesh::new(positions, &triangles), vertices: VertexCells::new(positions, &vertices) }
+    }
+
+    /// Returns the greatest distance between the terrain and a simplified triangle between these vertices, whose `corners` may have other
+    /// heights. `None` if that takes more than `steps`.
+    fn error_of(&self, vertices: [u32; 3], corners: &[[i32; 3]; 3], steps: &mut StepsLeft) -> Option<f64> {
+        let at_crossings = self.mesh.error_at_crossings(vertices, corners, &mut steps.of_walks)?;
+        let at_vertices = self.vertices.furthest_inside(corners, &mut steps.of_vertices)?;
+        Some(at_crossings.max(at_vertices))
+    }
+}
+
+/// The terrain before it was simplified.
+struct FineMesh<'a> {
+    positions: &'a [[i32; 3]],
+    adjacency: VertexAdjacency,
+}
+
+/// The place that a walk has come to.
+enum WalkPosition {
+    /// A vertex.
+    Vertex(u32),
+    /// A point on the edge between these two vertices, the first to the right of the way.
+    Edge(u32, u32),
+}
+
+impl<'a> FineMesh<'a> {
+    fn new(positions: &'a [[i32; 3]], triangles: &[[u32; 3]]) -> FineMesh<'a> {
+        FineMesh { positions, adjacency: VertexAdjacency::new(positions.len(), triangles) }
+    }
+
+    /// Returns the third corner of the triangle with the directed edge ab.
+    fn third(&self, a: u32, b: u32) -> Option<u32> {
+        self.adjacency.around(a).iter().find(|edge| edge[0] == b).map(|edge| edge[1])
+    }
+
+    /// Returns the steps that it takes to look at all triangles around `v`.
+    fn steps_around(&self, v: u32) -> u64 {
+        1 + self.adjacency.around(v).len() as u64 / TRIANGLES_PER_STEP
+    }
+
+    /// Returns the greatest distance where an edge of a coarse triangle crosses an edge of this mesh. `None` if that takes more than
+    /// `steps`, or if the edge leaves the mesh.
+    fn error_at_crossings(&self, vertices: [u32; 3], corners: &[[i32; 3]; 3], steps: &mut u64) -> Option<f64> {
+        let mut greatest = 0.0f64;
+        for [i, j] in [[0, 1], [1, 2], [2, 0]] {
+            // The other triangle at an edge has it in the other direction; the boundary is the same in both meshes.
+            if vertices[i] < vertices[j] {
+                let edge = CoarseEdge { from: corners[i], to: corners[j] };
+                greatest = greatest.max(self.error_along(vertices[i], vertices[j], &edge, steps)?);
+            }
+        }
+        Some(greatest)
+    }
+
+    /// Returns the greatest distance along one coarse edge, between its ends.
+    fn error_along(&self, from: u32, to: u32, edge: &CoarseEdge, steps: &mut u64) -> Option<f64> {
+        let mut greatest = 0.0f64;
+        let mut at = WalkPosition::Vertex(from);
+        loop {
+            let (WalkPosition::Vertex(v) | WalkPosition::Edge(_, v)) = at;
+            *steps = steps.checked_sub(self.steps_around(v))?;
+            at = match at {
+                WalkPosition::Vertex(v) if v == to => return Some(greatest),
+                WalkPosition::Vertex(v) => self.leave_vertex(v, to, edge)?,
+                WalkPosition::Edge(right, left) => {
+                    let [r, l] = [right, left].map(|v| self.positions[v as usize]);
+                    greatest = greatest.max(edge.distance_to_edge(r, l));
+                    let next = self.third(left, right)?;
+                    self.leave_edge(right, left, next, edge)
+                }
+            };
+            // The ends are among the vertices in the triangle.
+            if let WalkPosition::Vertex(v) = at
+                && v != to
+            {
+                greatest = greatest.max(edge.distance_to_vertex(self.positions[v as usize]));
+            }
+        }
+    }
+
+    /// Walks from vertex `v` towards vertex `to`.
+    fn leave_vertex(&self, v: u32, to: u32, way: &CoarseEdge) -> Option<WalkPosition> {
+        let here = self.positions[v as usize];
+        for &[right, left] in self.adjacency.around(v) {
+            if right == to || left == to {
+                return Some(WalkPosition::Vertex(to));
+            }
+            let [r, l] = [right, left].map(|corner| self.positions[corner as usize]);
+            let (of_right, of_left) = (way.side(r), way.side(l));
+            if of_right < 0 && of_left > 0 {
+                return Some(WalkPosition::Edge(right, left));
+            }
+            if let Some(corner) = [(right, r, of_right), (left, l, of_left)]
+                .into_iter()
+                .find_map(|(corner, p, side)| (side == 0 && way.leads(here, p)).then_some(corner))
+            {
+                return Some(WalkPosition::Vertex(corner));
+            }
+        }
+        None
+    }
+
+    /// Walks from the edge between `right` and `left` into the triangle whose third corner is `next`.
+    fn leave_edge(&self, right: u32, left: u32, next: u32, way: &CoarseEdge) -> WalkPosition {
+        match way.side(self.positions[next as usize]) {
+            0 => WalkPosition::Vertex(next),
+            side if side > 0 => WalkPosition::Edge(right, next),
+            _ => WalkPosition::Edge(next, left),
+        }
+    }
+}
+
+/// An edge of the simplified terrain.
+struct CoarseEdge {
+    from: [i32; 3],
+    to: [i32; 3],
+}
+
+impl CoarseEdge {
+    /// Returns a positive number if `point` is to the left of the edge, zero if it is on its line.
+    fn side(&self, point: [i32; 3]) -> i64 {
+        orient2d(plane(self.from), plane(self.to), plane(point))
+    }
+
+    /// Tells whether `point`, on the edge's line, lies ahead of `here`.
+    fn leads(&self, here: [i32; 3], point: [i32; 3]) -> bool {
+        (0..2).any(|k| {
+            (self.to[k] as i64 - self.from[k] as i64).signum() * (point[k] as i64 - here[k] as i64).signum() > 0
+        })
+    }
+
+    /// Returns the vertical distance to a vertex over or under the edge.
+    fn distance_to_vertex(&self, point: [i32; 3]) -> f64 {
+        let difference = |k: usize, p: [i32; 3]| p[k] as f64 - self.from[k] as f64;
+        let longer = if difference(0, self.to).abs() >= difference(1, self.to).abs() { 0 } else { 1 };
+        let share = difference(longer, point) / difference(longer, self.to);
+        (difference(2, self.to) * share - difference(2, point)).abs()
+    }
+
+    /// Returns the vertical distance to a fine edge where the two cross.
+    fn distance_to_edge(&self, right: [i32; 3], left: [i32; 3]) -> f64 {
+        let (to_right, to_left) = (-self.side(right) as f64, self.side(left) as f64);
+        let height = |p: [i32; 3]| p[2] as f64 - self.from[2] as f64;
+        let of_fine = (height(right) * to_left + height(left) * to_right) / (to_left + to_right);
+        let start = orient2d(plane(right), plane(left), plane(self.from)) as f64;
+        let end = -orient2d(plane(right), plane(left), plane(self.to)) as f64;
+        let of_coarse = height(self.to) * (start / (start + end));
+        (of_fine - of_coarse).abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use delaunay::geometry::Site;
+    use delaunay::mesh::half_edge::HalfEdgeMesh;
+    use delaunay::triangulation::canonical;
+    use proptest::prelude::*;
+
+    fn triangulation(positions: &[[i32; 3]], kept: &[u32]) -> HalfEdgeMesh {
+        let sites: Vec<Site> = kept.iter().map(|&v| plane(positions[v as usize])).collect();
+        canonical(&sites).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Mostly flat with a few peaks, so that most triangles are skipped.
+        #[test]
+        fn skipped_triangles_are_no_further_off(
+            mut positions in prop::collection::vec((0..3_000, 0..3_000, 0..20i32), 400..3_000),
+            peaks in prop::collection::vec((0..400usize, 20..5_000), 0..6),
+            every in 3..9usize,
+            lifts in prop::collection::vec(-30..30i32, 0..40),
+        ) {
+            peaks.iter().for_each(|&(at, height)| positions[at].2 = height);
+            let mut positions: Vec<[i32; 3]> = positions.into_iter().map(|(x, y, z)| [x, y, z]).collect();
+            positions.sort_unstable();
+            positions.dedup_by_key(|p| plane(*p));
+            let all: Vec<u32> = (0..positions.len() as u32).collect();
+            let fine = triangulation(&positions, &all);
+            let mut kept = vec![false; positions.len()];
+            kept.iter_mut().step_by(every).for_each(|kept| *kept = true);
+            fine.hull().for_each(|h| kept[fine.origin(h).get()] = true);
+            let kept: Vec<u32> = all.into_iter().filter(|&v| kept[v as usize]).collect();
+            let triangles = triangulation(&positions, &kept).corners().to_vec();
+
+            let (low, high) = positions.iter().fold((i32::MAX, i32::MIN), |(l, h), p| (l.min(p[2]), h.max(p[2])));
+            let mut moved = positions.clone();
+            for (p, lift) in moved.iter_mut().step_by(7).zip(&lifts) {
+                p[2] = (p[2] + lift).clamp(low, high);
+            }
+            let coarse = CoarseMesh { positions: kept.iter().map(|&v| moved[v as usize]).collect(), vertices: kept, triangles };
+
+            let every_vertex: Vec<u32> = (0..positions.len() as u32).collect();
+            let (mesh, vertices) = (FineMesh::new(&positions, fine.corners()), VertexCells::new(&positions, &every_vertex));
+            let whole = NearTerrain { mesh, vertices };
+            let mut steps = StepsLeft { of_walks: u64::MAX, of_vertices: u64::MAX };
+            let furthest = coarse.triangles.iter().map(|t| {
+                let corners = t.map(|v| coarse.positions[v as usize]);
+                whole.error_of(t.map(|v| coarse.vertices[v as usize]), &corners, &mut steps).unwrap()
+            });
+            let furthest = furthest.fold(0.0, f64::max);
+            let found = vertical_error(&positions, fine.corners(), &coarse);
+            let most = furthest + 2e-9;
+            prop_assert!(found == 0.0 && furthest == 0.0 || (furthest..most).contains(&found), "{} and {}", found, furthest);
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! The options of `[output]`.
+
+use crate::attributes::AttributeChoice;
+use crate::compression::{Compression, CompressionChoice};
+use crate::page::{NOT_BUILT_IN, is_built_in};
+use crate::raster::options::RasterOptions;
+use crs::geoid::option::HeightOffset;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::path::PathBuf;
+
+/// `[output]`: where the results go, and what they are.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutputOptions {
+    /// The directory to write to, relative to the configuration file.
+    #[serde(with = "sys::path_text")]
+    pub directory: PathBuf,
+    /// Where vertex colours come from.
+    #[serde(default)]
+    pub color: ColorChoice,
+    /// What vertices carry of their points, for viewers to style by.
+    #[serde(default, skip_serializing_if = "AttributeChoice::is_none")]
+    pub attributes: AttributeChoice,
+    /// Whether vertices have normals.
+    #[serde(default = "yes")]
+    pub normals: bool,
+    /// The files for viewers.
+    #[serde(default)]
+    pub format: OutputFormat,
+    /// Whether 3D Tiles have coarser levels above the exact tiles.
+    #[serde(default = "yes")]
+    pub levels: bool,
+    /// The most sites in a coarser tile.
+    #[serde(default, alias = "level_sites")]
+    pub max_points_per_level_tile: MaxPointsPerLevelTile,
+    /// What to add to heights so that they count from the ellipsoid, where 3D Tiles are placed on the globe.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_offset: Option<HeightOffset>,
+    /// How tiles are packed.
+    #[serde(default)]
+    pub compression: CompressionChoice,
+    /// The longest edge of a triangle that is not left out.
+    #[serde(default)]
+    pub max_edge: MaxEdge,
+    /// Whether slivers along the hull are left out.
+    #[serde(default)]
+    pub hull: Hull,
+    /// Whose the data are: viewers show it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copyright: Option<Copyright>,
+    /// Whether a page that shows the terrain is written beside it.
+    #[serde(default, deserialize_with = "page")]
+    pub page: bool,
+    /// The raster of heights, if there is to be one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub raster: Option<RasterOptions>,
+}
+
+impl OutputOptions {
+    /// Returns whose the data are, if the user says.
+    pub fn copyright(&self) -> Option<&str> {
+        self.copyright.as_ref().map(|copyright| copyright.0.as_str())
+    }
+
+    /// Returns how tiles are packed.
+    pub fn packing(&self) -> Compression {
+        match (self.compression, self.format) {
+            (CompressionChoice::Auto, OutputFormat::Tiles3d) | (CompressionChoice::Meshopt, _) => Compression::Meshopt,
+            (CompressionChoice::Auto, _) | (CompressionChoice::Quantized, _) => Compression::Quantized,
+            (CompressionChoice::None, _) => Compression::None,
+        }
+    }
+}
+
+/// The longest [`Copyright`] in characters. Every file has it.
+const LONGEST_COPYRIGHT: usize = 500;
+
+/// Whose the data are: one line of text.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Copyright(String);
+
+impl TryFrom<String> for Copyright {
+    type Error = String;
+
+    fn try_from(text: String) -> std::result::Result<Copyright, String> {
+        let is_line = !text.trim().is_empty() && !text.chars().any(is_no_text);
+        match is_line && text.chars().count() <= LONGEST_COPYRIGHT {
+            true => Ok(Copyright(text)),
+            false => Err(format!(
+                "copyright is one line of 1 to {LONGEST_COPYRIGHT} characters, without tabs and other characters that break \
+                 or turn a line, such as \
+                 \"(c) 2024 City of Example, CC BY 4.0\""
+            )),
+        }
+    }
+}
+
+/// Tells whether a character is none of a line of text: a control character, a separator of lines or paragraphs, or one that turns round the
+/// direction of what follows, also in the line that a viewer puts it into.
+fn is_no_text(character: char) -> bool {
+    let turns = matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    character.is_control() || turns || matches!(character, '\u{2028}' | '\u{2029}')
+}
+
+impl From<Copyright> for String {
+    fn from(copyright: Copyright) -> String {
+        copyright.0
+    }
+}
+
+/// Reads `page`, which only some builds of the program can write.
+fn page<'de, D: Deserializer<'de>>(value: D) -> Result<bool, D::Error> {
+    let wanted = bool::deserialize(value)?;
+    if wanted && !is_built_in() {
+        return Err(D::Error::custom(NOT_BUILT_IN));
+    }
+    Ok(wanted)
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// The files for viewers. The exact tiles are written in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OutputFormat {
+    /// Both if the terrain fits one file that viewers open, else 3D Tiles.
+    #[default]
+    Auto,
+    /// One file, `terrain.glb`.
+    Glb,
+    /// 3D Tiles, `tileset.json`.
+    #[serde(rename = "3dtiles", alias = "tiles")]
+    Tiles3d,
+}
+
+/// Where vertex colours come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ColorChoice {
+    /// The points' own colours, or elevation if they have none.
+    #[default]
+    Auto,
+    /// The points' own colours.
+    Rgb,
+    /// A ramp over the heights.
+    Elevation,
+    /// A colour per class.
+    Class,
+    /// No colours.
+    None,
+}
+
+impl ColorChoice {
+    /// Returns whether these may be the points' own colours.
+    pub fn may_be_own(self) -> bool {
+        matches!(self, ColorChoice::Auto | ColorChoice::Rgb)
+    }
+}
+
+/// What becomes of the slivers along the hull: flat triangles with an edge much longer than the spacing of the points, between the points
+/// at the edge of the terrain and the convex hull around them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Hull {
+    /// They are left out.
+    #[default]
+    Trimmed,
+    /// They stay, and the terrain reaches to the convex hull.
+    Whole,
+}
+
+/// How long an edge of a triangle may be in the plane. Triangles with a longer edge are left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
+pub enum MaxEdge {
+    /// Any length: no triangle is left out.
+    #[default]
+    None,
+    /// Ten times the local spacing of the sites.
+    Auto,
+    /// This many source units.
+    Length(f64),
+}
+
+impl TryFrom<toml::Value> for MaxEdge {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> std::result::Result<MaxEdge, String> {
+        let length = match value {
+            toml::Value::String(s) if s == "none" => return Ok(MaxEdge::None),
+            toml::Value::String(s) if s == "auto" => return Ok(MaxEdge::Auto),
+            toml::Value::Integer(i) => i as f64,
+            toml::Value::Float(f) => f,
+            _ => 0.0,
+        };
+        match length > 0.0 && length.is_finite() {
+            true => Ok(MaxEdge::Length(length)),
+            false => Err("max_edge is \"none\", \"auto\" or a positive number of source units, such as 30.0".into()),
+        }
+    }
+}
+
+impl From<MaxEdge> for toml::Value {
+    fn from(max_edge: MaxEdge) -> toml::Value {
+        match max_edge {
+            MaxEdge::None => toml::Value::String("none".into()),
+            MaxEdge::Auto => toml::Value::String("auto".into()),
+            MaxEdge::Length(length) => toml::Value::Float(length),
+        }
+    }
+}
+
+/// The most sites in a coarser tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
+pub struct MaxPointsPerLevelTile(pub u64);
+
+impl Default for MaxPointsPerLevelTile {
+    /// Returns the default of the exact tiles.
+    fn default() -> MaxPointsPerLevelTile {
+        MaxPointsPerLevelTile(50_000)
+    }
+}
+
+impl TryFrom<toml::Value> for MaxPointsPerLevelTile {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> std::result::Result<MaxPointsPerLevelTile, String> {
+        match value {
+            toml::Value::String(s) if s == "auto" => Ok(MaxPointsPerLevelTile::default()),
+            toml::Value::Integer(sites @ 100..=10_000_000) => Ok(MaxPointsPerLevelTile(sites as u64)),
+            _ => Err("max_points_per_level_tile is \"auto\" or a whole number from 100 to 10000000".into()),
+        }
+    }
+}
+
+impl From<MaxPointsPerLevelTile> for toml::Value {
+    fn from(points: MaxPointsPerLevelTile) -> toml::Value {
+        toml::Value::Integer(points.0 as i64)
+    }
+}

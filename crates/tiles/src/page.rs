@@ -1,0 +1,89 @@
+//! The page that shows a terrain in a browser. Its source is in `viewer/`, and the feature `viewer` builds it in.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+use sys::{Error, Result};
+
+/// The page as `npm run build --prefix viewer` makes it, if it is built in.
+#[cfg(feature = "viewer")]
+const PAGE: Option<&str> = Some(include_str!("../../../viewer/dist/index.html"));
+#[cfg(not(feature = "viewer"))]
+const PAGE: Option<&str> = None;
+
+/// Where the page has room for the name of the file that it opens. Nobody else's page has this.
+const TERRAIN: &str = "data-terrain=\"";
+
+/// [`TERRAIN`] is within this many bytes from the beginning of the page.
+const HEAD: u64 = 200;
+
+/// Why there is no page, and the command that makes one.
+pub const NOT_BUILT_IN: &str = "this build of gdt-batch has no page that shows a terrain: in its source folder, run \
+    npm ci --prefix viewer && npm run build --prefix viewer && cargo install --path . --features viewer";
+
+/// Tells whether the page is built in.
+pub fn is_built_in() -> bool {
+    PAGE.is_some()
+}
+
+/// Returns the page that opens the file `terrain`, a URI relative to the page.
+///
+/// # Errors
+/// [`Error::Config`] if the page is not built in.
+pub fn page_for(terrain: &str) -> Result<String> {
+    let page = PAGE.ok_or_else(|| Error::Config(NOT_BUILT_IN.into()))?;
+    Ok(page.replacen(TERRAIN, &format!("{TERRAIN}{terrain}"), 1))
+}
+
+/// Tells whether the file at `path` is such a page, whatever version wrote it.
+///
+/// # Errors
+/// What the system says if the file cannot be read.
+pub fn is_page(path: &Path) -> std::io::Result<bool> {
+    match path.metadata() {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
+        // Opening a pipe would wait for another process.
+        data => {
+            if !data?.is_file() {
+                return Ok(false);
+            }
+        }
+    }
+    let mut head = Vec::new();
+    File::open(path)?.take(HEAD).read_to_end(&mut head)?;
+    Ok(memchr::memmem::find(&head, TERRAIN.as_bytes()).is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_our_own_page_is_taken_for_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("index.html");
+        assert!(!is_page(&path).unwrap() && !is_page(folder.path()).unwrap());
+        std::fs::write(&path, "<!doctype html>\n<html lang=\"en\"><title>My survey</title>").unwrap();
+        assert!(!is_page(&path).unwrap());
+        std::fs::write(&path, "<!doctype html>\n<html lang=\"en\" data-terrain=\"terrain.glb\">").unwrap();
+        assert!(is_page(&path).unwrap());
+    }
+
+    #[test]
+    fn the_page_names_the_file_that_it_opens() {
+        match page_for("terrain.glb") {
+            Ok(page) => {
+                let at = page.find("data-terrain=\"terrain.glb\"").unwrap();
+                assert!(at < HEAD as usize && page.contains("three.js authors"), "no licences");
+                // The page works without any other host.
+                assert!(!page.contains("src=\"http") && !page.contains("href=\"http"));
+            }
+            Err(error) => {
+                assert!(!is_built_in());
+                assert_eq!(error.exit_code(), 2);
+                assert!(error.to_string().contains("--features viewer"), "{error}");
+            }
+        }
+    }
+}
