@@ -6,6 +6,7 @@ use crate::executor::{Executor, GpuUse};
 use crate::options::GpuOptions;
 use crate::triangulation_options::{Backend, TriangulationOptions};
 use delaunay::geometry::Site;
+use delaunay::host::Host;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::triangulation::canonical::with_buffers;
 use delaunay::triangulation::counts::TriangulationCounts;
@@ -15,6 +16,7 @@ use delaunay::voronoi::counts::PipelineCounts;
 use delaunay::voronoi::mesh_reply::MeshReply;
 use delaunay::voronoi::rejection::Rejection;
 use std::sync::OnceLock;
+use sys::interrupt;
 use sys::threads::{own_cpu_seconds, unless_interrupted};
 use sys::{Error, Result};
 
@@ -46,6 +48,7 @@ pub const MIN_POINTS_PER_THREAD: u64 = 3_000_000;
 impl Triangulator {
     /// Returns the triangulator that the configuration asks for, but for a GPU.
     pub fn without_gpu(config: &TriangulationOptions) -> Triangulator {
+        delaunay::host::set(Host { is_stopped: interrupt::is_wanted, cpu_seconds: own_cpu_seconds });
         let pipeline = config.backend != Backend::Reference;
         Triangulator { pipeline, gpu: OnceLock::new(), optional: None, not_opened: OnceLock::new() }
     }
@@ -126,7 +129,7 @@ impl Triangulator {
             outcome.reference = 1;
             // `spade` takes quadratic time on some sites, and cannot be stopped.
             let sites = sites.to_vec();
-            return Ok((unless_interrupted(move || reference::triangulate(&sites))?, outcome));
+            return Ok((unless_interrupted(move || reference::triangulate(&sites).map_err(failed))?, outcome));
         }
         match self.by_pipeline(sites) {
             Ok((mesh, counts)) => return Ok((mesh, TriangulationCounts { pipeline: 1, counts, ..outcome })),
@@ -134,7 +137,7 @@ impl Triangulator {
             Err(Rejection::NotAccepted(_)) => outcome.not_accepted = 1,
             Err(Rejection::TooFew | Rejection::TooMany | Rejection::OutOfReach) => outcome.small = 1,
         }
-        Ok((divide_and_conquer::triangulate(sites)?, outcome))
+        Ok((divide_and_conquer::triangulate(sites).map_err(failed)?, outcome))
     }
 
     fn by_pipeline(&self, sites: &[Site]) -> std::result::Result<(HalfEdgeMesh, PipelineCounts), Rejection> {
@@ -154,4 +157,8 @@ impl Triangulator {
         }
         done
     }
+}
+
+fn failed(error: delaunay::Error) -> Error {
+    Error::of_triangulation(error.is_stopped(), error)
 }

@@ -207,6 +207,11 @@ impl Error {
         move |source| source.downcast().unwrap_or_else(|source| Error::Io { action, path, source })
     }
 
+    /// Returns the error of a triangulation that was stopped, or that failed: sites are distinct and within reach, so it never should.
+    pub fn of_triangulation(is_stopped: bool, error: impl std::fmt::Display) -> Error {
+        if is_stopped { Error::Interrupted } else { Error::Broken(error.to_string()) }
+    }
+
     /// Returns an [`Error::Input`]: the file at `path` cannot be used because of `what`.
     pub fn input(path: impl AsRef<Path>, what: impl Into<String>) -> Error {
         Error::Input { path: path.as_ref().to_path_buf(), what: what.into() }

@@ -69,8 +69,13 @@ fn is_ignored(signal: i32) -> bool {
 /// [`Error::Interrupted`] if the process was asked to stop.
 #[track_caller]
 pub fn check() -> Result<()> {
-    if fault::is_signalled(Location::caller()) {
+    if is_wanted(Location::caller()) { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// Returns whether the process was asked to stop; the question is asked at `place`.
+pub fn is_wanted(place: &'static Location<'static>) -> bool {
+    if fault::is_signalled(place) {
         STOP.store(true, Ordering::Relaxed);
     }
-    if STOP.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+    STOP.load(Ordering::Relaxed)
 }

@@ -1,6 +1,8 @@
-//! Exact geometry on the job's integer lattice.
+//! Exact geometry on integers.
 
 mod bounds;
+#[cfg(feature = "serde")]
+mod bounds_serde;
 pub mod predicates;
 mod site;
 pub mod square_grid;

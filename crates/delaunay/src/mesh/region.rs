@@ -1,8 +1,8 @@
 //! The part of a triangulation within given edges.
 
+use crate::error::{Error, Result};
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
-use sys::{Error, Result};
 
 /// Marks the triangles of `mesh` that lie to the left of the directed edges `boundary`, which are given by their sites. The edges form
 /// closed loops, so these are the triangles that a flood from the right of the edges does not reach without crossing one of them.

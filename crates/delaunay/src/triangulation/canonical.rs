@@ -1,12 +1,12 @@
 //! The canonical triangulation on one thread, which keeps the pipeline's buffers from leaf to leaf.
 
+use crate::error::Result;
 use crate::geometry::Site;
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::triangulation::divide_and_conquer;
 use crate::voronoi;
 use crate::voronoi::PipelineBuffers;
 use std::cell::RefCell;
-use sys::Result;
 
 thread_local! {
     /// The pipeline's buffers that are not in use. They are kept from leaf to leaf, so that each thread faults in their pages only once.
@@ -24,8 +24,7 @@ pub fn with_buffers<T>(work: impl FnOnce(&mut PipelineBuffers) -> T) -> T {
 /// Computes the canonical Delaunay triangulation of distinct `sites` on this thread alone.
 ///
 /// # Errors
-/// [`Error::Interrupted`](sys::Error::Interrupted) if the process was asked to stop, [`Error::Broken`](sys::Error::Broken) if two sites coincide or
-/// one is out of reach.
+/// [`Error::Stopped`](crate::Error::Stopped), [`Error::Coincident`](crate::Error::Coincident), [`Error::OutOfReach`](crate::Error::OutOfReach).
 pub fn canonical(sites: &[Site]) -> Result<HalfEdgeMesh> {
     match with_buffers(|buffers| voronoi::triangulate(sites, buffers)) {
         Ok((mesh, _)) => Ok(mesh),

@@ -1,11 +1,11 @@
 //! How leaves were triangulated.
 
 use crate::voronoi::counts::PipelineCounts;
-use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
 /// How many leaves were triangulated in which way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TriangulationCounts {
     /// Leaves that the discrete-Voronoi pipeline triangulated.
     pub pipeline: u64,

@@ -7,13 +7,14 @@
 //! Every decision is exact, and ties follow the rule of `geometry::predicates`, which is that of sites raised by symbolic amounts, so
 //! that joining meets no ties at all.
 
+use crate::error::{Error, Result};
 use crate::geometry::REACH;
 use crate::geometry::predicates::{in_circle, orient2d};
 use crate::geometry::{Bounds, Site};
+use crate::host;
 use crate::mesh::flip::legalize;
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
-use sys::{Error, Result, interrupt};
 
 /// Sites have up to six directed edges each, on average.
 const MAX_SITES: usize = u32::MAX as usize / 6;
@@ -25,11 +26,11 @@ const STEPS_BETWEEN_CHECKS: usize = 1 << 14;
 /// lie on one line.
 ///
 /// # Errors
-/// [`Error::Interrupted`] if the process was asked to stop, [`Error::Broken`] if two sites coincide, if a coordinate exceeds
-/// [`REACH`], or if there are too many sites for 32-bit numbers of their edges.
+/// [`Error::Stopped`]; [`Error::Coincident`] if two sites coincide; [`Error::OutOfReach`] if a coordinate exceeds [`REACH`], or if there are too
+/// many sites for 32-bit numbers of their edges.
 pub fn triangulate(sites: &[Site]) -> Result<HalfEdgeMesh> {
     if sites.len() > MAX_SITES || sites.as_flattened().iter().any(|c| !(-REACH..=REACH).contains(c)) {
-        return Err(Error::Broken("a site is out of reach, or there are too many for one node".into()));
+        return Err(Error::OutOfReach);
     }
     let mut subdivision = Subdivision::new(sites);
     if sites.len() < 2 {
@@ -37,7 +38,7 @@ pub fn triangulate(sites: &[Site]) -> Result<HalfEdgeMesh> {
     }
     subdivision.triangulate(0, sites.len(), Axis::X)?;
     let mut mesh = subdivision.into_mesh()?;
-    interrupt::check()?;
+    host::check()?;
     let flips = legalize(&mut mesh, sites);
     debug_assert_eq!(flips, 0, "joining decides every edge");
     Ok(mesh)
@@ -143,7 +144,7 @@ impl Subdivision {
             self.triangulate_sorted(start, end)?
         } else {
             if part.len() > STEPS_BETWEEN_CHECKS {
-                interrupt::check()?;
+                host::check()?;
             }
             let middle = part.len() / 2;
             part.select_nth_unstable_by_key(middle, |placed| axis.key(placed.site));
@@ -213,7 +214,7 @@ impl Subdivision {
     /// Joins two triangulations, all sites of the first before those of the second.
     ///
     /// # Errors
-    /// [`Error::Interrupted`].
+    /// [`Error::Stopped`].
     fn join(&mut self, left: HullEnds, right: HullEnds) -> Result<HullEnds> {
         let (left_inner, right_inner) = self.lower_tangent(left.last, right.first);
         let mut base = self.connect(right_inner.reversed(), left_inner);
@@ -222,7 +223,7 @@ impl Subdivision {
         // `base` leads from the right part to the left part, and moves up until it is the upper common tangent.
         for step in 1.. {
             if step % STEPS_BETWEEN_CHECKS == 0 {
-                interrupt::check()?;
+                host::check()?;
             }
             let first_left = self.edges[base.reversed().get()].counterclockwise;
             let from_left = self.candidate(base, first_left, |links| links.counterclockwise);
@@ -367,13 +368,13 @@ impl Subdivision {
     /// Returns the triangles.
     ///
     /// # Errors
-    /// [`Error::Interrupted`].
+    /// [`Error::Stopped`].
     fn into_mesh(self) -> Result<HalfEdgeMesh> {
         let mut half_edge_of = vec![HalfEdgeIndex::HULL; self.edges.len()];
         let mut mesh = HalfEdgeMesh { triangles: Vec::with_capacity(2 * self.sites.len()), twins: Vec::new() };
         for edge in (0..self.edges.len() as u32).map(Edge) {
             if edge.get() % STEPS_BETWEEN_CHECKS == 0 {
-                interrupt::check()?;
+                host::check()?;
             }
             if let Some(sides) = self.triangle_left_of(edge).filter(|_| half_edge_of[edge.get()] == HalfEdgeIndex::HULL)
             {
@@ -399,7 +400,7 @@ impl Subdivision {
 }
 
 fn coincidence() -> Error {
-    Error::Broken("two sites of one tile coincide".into())
+    Error::Coincident
 }
 
 #[cfg(test)]
@@ -409,13 +410,13 @@ mod tests {
     #[test]
     fn two_sites_in_one_place_are_an_error() {
         let error = triangulate(&[[0, 0], [4, 1], [0, 0], [2, 2]]).unwrap_err();
-        assert!(matches!(error, Error::Broken(_)), "{error}");
+        assert_eq!(error, Error::Coincident);
     }
 
     #[test]
     fn sites_out_of_reach_are_an_error() {
         for far in [[REACH + 1, 0], [0, -REACH - 1], [i32::MIN, 5]] {
-            assert!(matches!(triangulate(&[[0, 0], [4, 1], far]), Err(Error::Broken(_))));
+            assert!(matches!(triangulate(&[[0, 0], [4, 1], far]), Err(Error::OutOfReach)));
         }
         assert_eq!(triangulate(&[[-REACH, -REACH], [REACH, -REACH], [0, REACH]]).unwrap().triangles.len(), 1);
     }
@@ -428,7 +429,7 @@ mod tests {
         for sites in [line, column] {
             for twice in 0..sites.len() {
                 let twins = [&sites[..], &[sites[twice]]].concat();
-                assert!(matches!(triangulate(&twins), Err(Error::Broken(_))), "{:?}", sites[twice]);
+                assert!(matches!(triangulate(&twins), Err(Error::Coincident)), "{:?}", sites[twice]);
             }
         }
     }

@@ -1,12 +1,12 @@
 //! The reference: `spade`, then canonical flips. The tests compare the pipeline, and divide and conquer, with it.
 
+use crate::error::Error;
 use crate::geometry::Site;
 use crate::geometry::predicates::orient2d;
 use crate::mesh::flip::legalize;
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use spade::{DelaunayTriangulation, HasPosition, InsertionError, Point2, Triangulation as _};
-use sys::Error;
 
 struct SpadeVertex {
     site: Site,
@@ -25,8 +25,8 @@ impl HasPosition for SpadeVertex {
 /// lie on one line.
 ///
 /// # Errors
-/// [`Error::Broken`] if `spade` refuses the sites or two of them coincide.
-pub fn triangulate(sites: &[Site]) -> sys::Result<HalfEdgeMesh> {
+/// [`Error::Broken`] if `spade` refuses the sites, [`Error::Coincident`] if two of them coincide.
+pub fn triangulate(sites: &[Site]) -> crate::Result<HalfEdgeMesh> {
     if collinear(sites) {
         return Ok(HalfEdgeMesh::default());
     }
@@ -36,7 +36,7 @@ pub fn triangulate(sites: &[Site]) -> sys::Result<HalfEdgeMesh> {
     };
     let delaunay = delaunay.map_err(|e| Error::Broken(format!("the reference triangulation refuses a site: {e}")))?;
     if delaunay.num_vertices() != sites.len() {
-        return Err(Error::Broken("two sites of one tile coincide".into()));
+        return Err(Error::Coincident);
     }
     let mut mesh = to_mesh(&delaunay);
     legalize(&mut mesh, sites);

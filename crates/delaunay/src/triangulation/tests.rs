@@ -1,5 +1,6 @@
 //! The pipeline, and divide and conquer, against the reference on random sites of every kind that is known to be hard.
 
+use crate::Result;
 use crate::geometry::Site;
 use crate::mesh::flip::fails;
 use crate::mesh::half_edge::HalfEdgeMesh;
@@ -7,7 +8,6 @@ use crate::triangulation::{divide_and_conquer, reference};
 use crate::voronoi::test_cases::{KINDS, Random, case};
 use crate::voronoi::{PipelineBuffers, triangulate};
 use std::collections::{BTreeMap, BTreeSet};
-use sys::Result;
 
 /// Returns the set of triangles, each from its least corner.
 fn triangles(mesh: &HalfEdgeMesh) -> BTreeSet<[u32; 3]> {

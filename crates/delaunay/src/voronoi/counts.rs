@@ -1,6 +1,6 @@
 //! What the steps of the pipeline count, and how long they take.
 
-use sys::threads::own_cpu_seconds;
+use crate::host::cpu_seconds;
 
 /// The steps that [`PipelineCounts::nanoseconds`] distinguishes.
 pub const STEP_NAMES: [&str; 8] = [
@@ -15,7 +15,8 @@ pub const STEP_NAMES: [&str; 8] = [
 ];
 
 /// What the steps count: sites, triangles or edges.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PipelineCounts {
     /// Leaves whose mesh a GPU has made.
     pub on_gpu: u64,
@@ -59,12 +60,12 @@ pub(super) struct StepTimer(f64);
 impl StepTimer {
     /// Starts the first step.
     pub(super) fn start() -> StepTimer {
-        StepTimer(own_cpu_seconds())
+        StepTimer(cpu_seconds())
     }
 
     /// Adds the time since the last call to `step`, and starts the next step.
     pub(super) fn finish(&mut self, counts: &mut PipelineCounts, step: usize) {
-        let now = own_cpu_seconds();
+        let now = cpu_seconds();
         counts.nanoseconds[step] += ((now - self.0) * 1e9) as u64;
         self.0 = now;
     }

@@ -33,9 +33,10 @@ pub fn merge_frontiers(
     check_memory(below.iter().map(|&(store, child)| Frontier::count(store, child)).sum::<Result<u64>>()?, memory)?;
     let (union, flows_below) = join(below)?;
     let sites: Vec<Site> = union.iter().map(BorderVertex::plane).collect();
-    let mesh = divide_and_conquer::triangulate(&sites)?;
+    let mesh = divide_and_conquer::triangulate(&sites).map_err(|e| Error::of_triangulation(e.is_stopped(), e))?;
     interrupt::check()?;
-    let covered = covered(&mesh, bytemuck::cast_slice(&flows_below.boundary))?;
+    let covered = covered(&mesh, bytemuck::cast_slice(&flows_below.boundary))
+        .map_err(|e| Error::of_triangulation(e.is_stopped(), e))?;
     interrupt::check()?;
     let cell = cell.with_border();
     let found = find_final(&mesh, &sites, cell.as_ref(), |triangle| covered[triangle]);

@@ -44,9 +44,9 @@ impl<'a> Filling<'a> {
         let mut positions: Vec<[i32; 3]> = vertices.iter().map(|&v| terrain[v as usize]).collect();
         moved.iter().for_each(|&(v, height)| positions[number[v as usize].get()][2] = height);
         let sites: Vec<Site> = positions.iter().map(|&p| plane(p)).collect();
-        let mesh = canonical(&sites)?;
+        let mesh = canonical(&sites).map_err(|e| Error::of_triangulation(e.is_stopped(), e))?;
         let boundary: Vec<_> = boundary.iter().map(|edge| edge.map(|v| number[v as usize])).collect();
-        let within = covered(&mesh, &boundary)?;
+        let within = covered(&mesh, &boundary).map_err(|e| Error::of_triangulation(e.is_stopped(), e))?;
         if !within.contains(&true) {
             return Err(Error::Broken("a terrain without triangles cannot be simplified".into()));
         }
