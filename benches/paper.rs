@@ -258,7 +258,7 @@ struct Gpu {
 impl Gpu {
     fn open() -> Result<Gpu, String> {
         let adapters = device::adapters();
-        let infos: Vec<_> = adapters.iter().map(wgpu::Adapter::get_info).collect();
+        let infos: Vec<_> = adapters.iter().map(|adapter| adapter.get_info()).collect();
         let chosen = device::choose(&infos, &AdapterRequest::new(None, true))?;
         let device = Device::open(&adapters[chosen]).map_err(|error| error.to_string())?;
         let kind = if device::is_software(&infos[chosen]) { "software GPU" } else { "GPU" };

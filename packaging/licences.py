@@ -13,7 +13,7 @@ The page of `gdt-batch view` has the licences of its parts inside.
 
 
 def metadata(target):
-    command = ["cargo", "metadata", "--format-version", "1", "--locked", "--features", "viewer", "--filter-platform", target]
+    command = ["cargo", "metadata", "--format-version", "1", "--locked", "--filter-platform", target]
     return json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
 
 

@@ -7,6 +7,7 @@
 pub mod cli;
 pub mod completions;
 pub mod config;
+#[cfg(feature = "gpu")]
 pub mod gpu_trial;
 pub mod init;
 pub mod manual;

@@ -4,7 +4,6 @@
 
 use clap::Parser;
 use gdt_batch::cli::{Cli, CliCommand, PrintOptions, ViewOptions};
-use gdt_batch::gpu_trial;
 use gdt_batch::init::NewConfiguration;
 use gdt_batch::input::histogram::Histogram;
 use gdt_batch::input::info::{SourceDescription, describe};
@@ -260,6 +259,9 @@ fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: Print
 #[cfg(feature = "viewer")]
 fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
     use gdt_batch::view::{View, browser};
+    if !gdt_batch::output::page::is_built_in() {
+        return Err(Error::Config(gdt_batch::output::page::NOT_BUILT_IN.into()));
+    }
     let wanted = std::net::SocketAddr::new(options.address, options.port);
     let view = View::open(&options.directory, wanted, &options.host)?;
     interrupt::listen()?;
@@ -277,17 +279,23 @@ fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
 
 #[cfg(not(feature = "viewer"))]
 fn view_output(_: &ViewOptions, _: PrintOptions) -> Result<ExitCode> {
-    Err(Error::Config(gdt_batch::output::page::NOT_BUILT_IN.into()))
+    Err(Error::Config("this build of gdt-batch has no server: build it with --features viewer".into()))
 }
 
+#[cfg(feature = "gpu")]
 fn test_gpu(adapter: Option<&str>, leaves: Option<usize>, print: PrintOptions) -> Result<ExitCode> {
-    let check = gpu_trial::run(adapter, leaves)?;
+    let check = gdt_batch::gpu_trial::run(adapter, leaves)?;
     print_result(&check, print)?;
     if check.holds() {
         return Ok(ExitCode::from(u8::from(check.failure.is_some())));
     }
     say("error: this GPU and the CPU disagree: see above; please report it");
     Ok(ExitCode::from(4))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn test_gpu(_: Option<&str>, _: Option<usize>, _: PrintOptions) -> Result<ExitCode> {
+    Err(Error::Config("this build of gdt-batch uses no GPU: build it with the feature gpu".into()))
 }
 
 fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<ExitCode> {

@@ -36,6 +36,7 @@ fn the_short_version_is_that_of_the_package_and_the_long_one_says_what_is_built_
     let long = run(&["--version"]);
     let features = [
         (cfg!(feature = "fault-injection"), "fault-injection"),
+        (cfg!(feature = "gpu"), "gpu"),
         (cfg!(feature = "remote"), "remote"),
         (cfg!(feature = "viewer"), "viewer"),
     ];

@@ -15,6 +15,7 @@ const COMPOUND_PATH: &str = "www.opengis.net/def/crs-compound?";
 /// The codes of a system of places and, if it is named too, one of heights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CrsName {
+    /// That of the system of places.
     pub plane: u32,
     pub(crate) heights: Option<u32>,
 }

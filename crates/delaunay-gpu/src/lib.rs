@@ -1,38 +1,17 @@
-//! Steps G1 to G6 on a GPU, with wgpu: Vulkan, Metal or DX12.
+//! Leaves on a GPU, with wgpu: Vulkan, Metal or DX12; and the choice between a GPU and the CPU for each leaf.
 //!
-//! `shaders/` has one WGSL file per step, and [`twins`] has a plain loop for each that gives the same numbers bit for bit.
-//! [`steps`] records which dispatches a step consists of, [`engine`] runs such a [`recording`] on a device, and [`executor`] gets
-//! the meshes of leaves from a thread of its own, many leaves at a time. Room `voronoi` completes these meshes and proves them.
+//! Without the feature `wgpu` there is no device, and the CPU does every leaf.
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
-pub mod atlas;
 pub mod benefit;
-pub mod buffer_id;
-pub mod buffers;
-pub mod device;
-pub mod engine;
-pub mod error;
-pub mod executor;
-#[cfg(feature = "fault-injection")]
-mod fake_engine;
-pub mod filled_atlas;
-pub mod flip_marks;
-mod gpu_thread;
-pub mod landed;
-pub mod leaf_flags;
-pub mod mesh_engine;
-pub mod mesh_steps;
+#[cfg(not(feature = "wgpu"))]
+mod no_device;
+#[cfg(feature = "wgpu")]
+mod on_device;
 pub mod options;
-mod passes;
-pub mod recording;
-pub mod returned;
-pub mod selftest;
-mod staging;
-pub mod steps;
-pub mod texture_size;
-pub mod timestamps;
 pub mod triangulation_options;
 pub mod triangulator;
-pub mod twins;
-mod upload;
+
+#[cfg(feature = "wgpu")]
+pub use on_device::*;

@@ -34,7 +34,7 @@ pub enum TextureSide {
     /// Chosen by the number of sites, within what the adapter supports.
     #[default]
     Auto,
-    /// The largest that fits: at most 16,384 pixels, and what [`crate::filled_atlas::AtlasLimits`] allow.
+    /// The largest that fits: at most 16,384 pixels, and what the device allows.
     Max,
     /// This many pixels; more than 16,384 are 16,384.
     Side(u32),

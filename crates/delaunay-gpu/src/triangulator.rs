@@ -2,7 +2,10 @@
 //! conquered.
 
 use crate::benefit::GpuFigures;
+#[cfg(feature = "wgpu")]
 use crate::executor::{Executor, GpuUse};
+#[cfg(not(feature = "wgpu"))]
+use crate::no_device::{Executor, GpuUse};
 use crate::options::GpuOptions;
 use crate::triangulation_options::{Backend, TriangulationOptions};
 use delaunay::geometry::Site;
@@ -150,8 +153,8 @@ impl Triangulator {
         let is_helped = done.as_ref().is_ok_and(|(_, counts)| counts.on_gpu > 0);
         match done.is_ok() {
             // It has cost more than a leaf alone.
-            true if asked && !is_helped => gpu.benefit.note_in_vain(&reply),
-            true => gpu.benefit.note(is_helped, sites.len(), own_cpu_seconds() - begun),
+            true if asked && !is_helped => gpu.benefit().note_in_vain(&reply),
+            true => gpu.benefit().note(is_helped, sites.len(), own_cpu_seconds() - begun),
             // The leaf does not suit the pipeline, with a GPU or without.
             false => {}
         }

@@ -8,6 +8,7 @@ static AT_START: OnceLock<Option<Left>> = OnceLock::new();
 /// What a limit leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Left {
+    /// How many bytes.
     pub bytes: u64,
     /// The limit, for people.
     limit: &'static str,

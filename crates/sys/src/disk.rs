@@ -211,7 +211,9 @@ pub fn list(path: &Path) -> Result<Vec<PathBuf>> {
 
 /// Writes to a file from a position on, one piece after the other.
 pub struct WriteFrom<'a> {
+    /// The file.
     pub file: &'a File,
+    /// Where the next piece goes, in bytes.
     pub at: u64,
 }
 

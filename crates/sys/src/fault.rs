@@ -131,32 +131,38 @@ mod injection {
     use std::panic::Location;
     use std::time::Duration;
 
+    /// Nothing is ever due in this build.
     #[inline(always)]
     pub fn is_due(_: &str) -> bool {
         false
     }
 
+    /// No question is answered as if a signal came.
     #[inline(always)]
     pub fn is_signalled(_: &Location) -> bool {
         false
     }
 
+    /// The usual time.
     #[inline(always)]
     pub fn commit_interval() -> Option<Duration> {
         None
     }
 
     #[cfg(feature = "remote")]
+    /// The usual time.
     #[inline(always)]
     pub fn network_patience() -> Option<Duration> {
         None
     }
 
+    /// The number that the system tells.
     #[inline(always)]
     pub fn processors() -> Option<usize> {
         None
     }
 
+    /// Makes the change, and writes nothing down.
     #[inline(always)]
     pub fn traced<'a, T>(
         change: impl FnOnce() -> io::Result<T>,
@@ -165,6 +171,7 @@ mod injection {
         change()
     }
 
+    /// Writes nothing down.
     #[inline(always)]
     pub fn mark(_: &str) {}
 }

@@ -1,4 +1,4 @@
-//! The page that shows a terrain in a browser. Its source is in `viewer/`, and the feature `viewer` builds it in.
+//! The page that shows a terrain in a browser. Its source is in `viewer/`; `build.rs` finds the page if it was made.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
@@ -6,11 +6,8 @@ use std::path::Path;
 
 use sys::{Error, Result};
 
-/// The page as `npm run build --prefix viewer` makes it, if it is built in.
-#[cfg(feature = "viewer")]
-const PAGE: Option<&str> = Some(include_str!("../../../viewer/dist/index.html"));
-#[cfg(not(feature = "viewer"))]
-const PAGE: Option<&str> = None;
+/// The page as `npm run build --prefix viewer` makes it; empty if it was not there when the program was built.
+const PAGE: &str = include_str!(concat!(env!("OUT_DIR"), "/index.html"));
 
 /// Where the page has room for the name of the file that it opens. Nobody else's page has this.
 const TERRAIN: &str = "data-terrain=\"";
@@ -18,13 +15,13 @@ const TERRAIN: &str = "data-terrain=\"";
 /// [`TERRAIN`] is within this many bytes from the beginning of the page.
 const HEAD: u64 = 200;
 
-/// Why there is no page, and the command that makes one.
+/// Why there is no page, and the commands that make one.
 pub const NOT_BUILT_IN: &str = "this build of gdt-batch has no page that shows a terrain: in its source folder, run \
-    npm ci --prefix viewer && npm run build --prefix viewer && cargo install --path . --features viewer";
+    npm ci --prefix viewer && npm run build --prefix viewer && cargo install --path .";
 
 /// Tells whether the page is built in.
 pub fn is_built_in() -> bool {
-    PAGE.is_some()
+    !PAGE.is_empty()
 }
 
 /// Returns the page that opens the file `terrain`, a URI relative to the page.
@@ -32,8 +29,10 @@ pub fn is_built_in() -> bool {
 /// # Errors
 /// [`Error::Config`] if the page is not built in.
 pub fn page_for(terrain: &str) -> Result<String> {
-    let page = PAGE.ok_or_else(|| Error::Config(NOT_BUILT_IN.into()))?;
-    Ok(page.replacen(TERRAIN, &format!("{TERRAIN}{terrain}"), 1))
+    if !is_built_in() {
+        return Err(Error::Config(NOT_BUILT_IN.into()));
+    }
+    Ok(PAGE.replacen(TERRAIN, &format!("{TERRAIN}{terrain}"), 1))
 }
 
 /// Tells whether the file at `path` is such a page, whatever version wrote it.
@@ -82,7 +81,7 @@ mod tests {
             Err(error) => {
                 assert!(!is_built_in());
                 assert_eq!(error.exit_code(), 2);
-                assert!(error.to_string().contains("--features viewer"), "{error}");
+                assert!(error.to_string().contains("npm run build --prefix viewer"), "{error}");
             }
         }
     }

@@ -189,8 +189,8 @@ impl Place {
 
     /// Serves the results and looks whether it says its address. A program without the page says how it is built in.
     fn view(&self, words: &[String], at: &str) {
-        if !cfg!(feature = "viewer") {
-            return gdt_batch(self.folder.path(), words).refused(2, &["--features viewer"]);
+        if !gdt_batch::output::page::is_built_in() {
+            return gdt_batch(self.folder.path(), words).refused(2, &["npm run build --prefix viewer"]);
         }
         if !self.folder.path().join(&words[1]).exists() {
             self.run_job();
@@ -216,7 +216,7 @@ fn completed(mut job: Table) -> Table {
         }
     }
     let page = job["output"].get("page").and_then(Value::as_bool);
-    if page == Some(true) && !cfg!(feature = "viewer") {
+    if page == Some(true) && !gdt_batch::output::page::is_built_in() {
         job["output"].as_table_mut().unwrap().insert("page".into(), false.into());
     }
     job

@@ -14,10 +14,12 @@ impl Random {
         self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
     }
 
+    /// Returns a number from 0 to `end` - 1.
     pub fn below(&mut self, end: i32) -> i32 {
         ((self.next() >> 33) % end as u64) as i32
     }
 
+    /// Returns a number from 0 to 1, without 1.
     pub fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }

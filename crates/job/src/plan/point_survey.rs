@@ -132,7 +132,7 @@ impl<'a> PointSurvey<'a> {
     }
 
     /// Returns the box outside which a point is a mistake if such points are few; `None` if there are too few points to tell.
-    pub fn plausible_box(&self) -> Result<Option<RowBox>> {
+    pub(crate) fn plausible_box(&self) -> Result<Option<RowBox>> {
         Ok(self.middle()?.and_then(|middle| plausible_box(&middle.bounds, 1.0)))
     }
 

@@ -161,6 +161,7 @@ impl Lowest {
 /// A value that may stand for nodata, though it is none of the numbers that programs write for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubtfulHeight {
+    /// The value, and who has it.
     pub height: SharedHeight,
     /// Where all other heights lie.
     pub others: [f64; 2],

@@ -7,7 +7,9 @@ use crate::text::number::Number;
 /// The least and the greatest x, y, z of rows. Without a row, infinite and inside out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RowBox {
+    /// The least x, y, z.
     pub min: [f64; 3],
+    /// The greatest x, y, z.
     pub max: [f64; 3],
 }
 

@@ -22,9 +22,11 @@ pub const TRAILER: usize = 4;
 /// What a raster's directories say besides where its blocks are.
 #[derive(Clone, Debug)]
 pub struct RasterHead<'a> {
+    /// What the configuration asks for.
     pub options: RasterOptions,
     /// The x of the western and the y of the northern edge.
     pub corner: [f64; 2],
+    /// The side of a cell, in units of x and y.
     pub cell_size: f64,
     pub system: &'a RasterSystem,
     /// Whose the data are, if the user says.

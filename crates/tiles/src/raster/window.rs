@@ -11,7 +11,9 @@ use sys::{Result, interrupt};
 /// How lattice heights become heights of the source.
 #[derive(Clone, Copy, Debug)]
 pub struct HeightScale {
+    /// The height of 0.
     pub offset: f64,
+    /// The height of 1 above that of 0.
     pub step: f64,
 }
 
@@ -25,7 +27,9 @@ impl HeightScale {
 /// Vertices on the lattice and triangles between them.
 #[derive(Debug, Default)]
 pub struct LatticeMesh {
+    /// The vertices: x, y, z in steps of the lattice.
     pub positions: Vec<[i32; 3]>,
+    /// The corners of each triangle: numbers of vertices.
     pub triangles: Vec<[u32; 3]>,
 }
 
