@@ -53,7 +53,7 @@ impl House {
     fn absolute(&self, place: &str, path: &[String]) -> Option<Vec<String>> {
         let (first, rest) = path.split_first()?;
         match first.as_str() {
-            "crate" | "gdt_batch" => return Some(rest.to_vec()),
+            "crate" => return Some(rest.to_vec()),
             "self" => return Some(join(place, rest)),
             "super" => {
                 let parent = place.rsplit_once('/').map_or("", |(parent, _)| parent);

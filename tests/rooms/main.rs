@@ -1,4 +1,4 @@
-//! The rooms of `src` and the directions between them: a test reads the imports of every file and fails with the arrow that breaks
+//! The modules of each crate and the directions between them: a test reads the imports of every file and fails with the arrow that breaks
 //! a rule. `rules.rs` holds the rules.
 
 mod house;
@@ -7,19 +7,33 @@ mod source;
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use house::House;
 
-/// Returns a sentence for every rule that `files` break. A file is a name relative to `src`, and a text.
-fn broken<'a>(files: impl IntoIterator<Item = (&'a str, &'a str)>) -> Vec<String> {
-    rules::broken(&House::new(files).arrows())
+/// Returns a sentence for every rule that `files` of the crate in the folder `of` break. A file is a name relative to that, and a text.
+fn broken_in<'a>(of: &str, files: impl IntoIterator<Item = (&'a str, &'a str)>) -> Vec<String> {
+    rules::broken(of, &House::new(files).arrows())
 }
 
-/// Returns the Rust files of `src`: names and texts.
-fn real_files() -> BTreeMap<String, String> {
+/// The same for a crate without rules of its own.
+fn broken<'a>(files: impl IntoIterator<Item = (&'a str, &'a str)>) -> Vec<String> {
+    broken_in("lib/src", files)
+}
+
+/// Returns the folders with the sources of the crates.
+fn folders() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let crates = fs::read_dir(root.join("crates")).unwrap();
+    let folders = crates.map(|entry| entry.unwrap().path().join("src"));
+    let folders = folders.map(|path| path.strip_prefix(root).unwrap().to_path_buf());
+    folders.chain([PathBuf::from("src")]).collect()
+}
+
+/// Returns the Rust files in a folder of sources: names and texts.
+fn real_files(of: &Path) -> BTreeMap<String, String> {
     let mut files = BTreeMap::new();
-    collect(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), "", &mut files);
+    collect(&Path::new(env!("CARGO_MANIFEST_DIR")).join(of), "", &mut files);
     files
 }
 
@@ -39,20 +53,26 @@ fn borrowed(files: &BTreeMap<String, String>) -> impl Iterator<Item = (&str, &st
 }
 
 #[test]
-fn the_source_keeps_the_rules() {
-    let broken = broken(borrowed(&real_files()));
-    assert!(broken.is_empty(), "{} broken rules:\n{}", broken.len(), broken.join("\n"));
+fn the_sources_keep_the_rules() {
+    let folders = folders();
+    assert!(folders.len() == 10, "{folders:?}");
+    for of in folders {
+        let broken = broken_in(of.to_str().unwrap(), borrowed(&real_files(&of)));
+        assert!(broken.is_empty(), "{} broken rules:\n{}", broken.len(), broken.join("\n"));
+    }
 }
 
 #[test]
 fn one_wrong_use_in_the_source_is_found() {
-    let mut files = real_files();
-    let before = broken(borrowed(&files));
-    let text = files.get_mut("geometry/lattice.rs").unwrap();
+    let mut files = real_files(Path::new("crates/job/src"));
+    let before = broken_in("crates/job/src", borrowed(&files));
+    let text = files.get_mut("plan/extent.rs").unwrap();
     let line = text.lines().position(|line| line.starts_with("use ")).unwrap() + 1;
-    *text = text.replacen("use ", "use crate::config::load; use ", 1);
-    let after = broken(borrowed(&files));
-    let wrong = format!("src/geometry/lattice.rs:{line} imports crate::config::load from src/config/mod.rs");
+    *text = text.replacen("use ", "use crate::levels::make_level::make_level; use ", 1);
+    let after = broken_in("crates/job/src", borrowed(&files));
+    let wrong = format!(
+        "crates/job/src/plan/extent.rs:{line} imports crate::levels::make_level::make_level from crates/job/src/levels/make_level.rs"
+    );
     assert!(!before.iter().any(|sentence| sentence.contains(&wrong)));
     assert!(after.iter().any(|sentence| sentence.starts_with(&wrong)), "{}", after.join("\n"));
 }
@@ -79,18 +99,18 @@ fn a_sound_crate_passes() {
 fn a_circle_is_reported_with_all_its_arrows() {
     let files =
         [("a.rs", "\nuse crate::b::B;"), ("b.rs", "fn f() { crate::c::g() }"), ("c.rs", "use crate::{a::A as Z};")];
-    let circle = "a circle in src/: a.rs -> b.rs -> c.rs -> a.rs\n    src/a.rs:2 imports crate::b::B from src/b.rs\n    \
-                  src/b.rs:1 imports crate::c::g from src/c.rs\n    src/c.rs:1 imports crate::a::A from src/a.rs";
+    let circle = "a circle in lib/src/: a.rs -> b.rs -> c.rs -> a.rs\n    lib/src/a.rs:2 imports crate::b::B from lib/src/b.rs\n    \
+                  lib/src/b.rs:1 imports crate::c::g from lib/src/c.rs\n    lib/src/c.rs:1 imports crate::a::A from lib/src/a.rs";
     assert_eq!(broken(files), [circle]);
 }
 
 #[test]
 fn circles_between_rooms_are_found_even_if_no_file_is_in_one() {
     let files = [("a/x.rs", "use crate::b::x::X;"), ("b/y.rs", "use crate::a::y::Y;"), ("a/y.rs", ""), ("b/x.rs", "")];
-    assert!(broken(files)[0].starts_with("a circle in src/: a -> b -> a"));
+    assert!(broken(files)[0].starts_with("a circle in lib/src/: a -> b -> a"));
     let sub = files.map(|(file, text)| (format!("r/{file}"), text.replace("crate", "crate::r")));
     assert!(
-        broken(sub.iter().map(|(f, t)| (f.as_str(), t.as_str())))[0].starts_with("a circle in src/r/: a -> b -> a")
+        broken(sub.iter().map(|(f, t)| (f.as_str(), t.as_str())))[0].starts_with("a circle in lib/src/r/: a -> b -> a")
     );
 }
 
@@ -106,80 +126,51 @@ fn names_lead_to_the_file_that_defines_them() {
     for way in ways {
         let room = "mod p; mod q; pub use p::P; pub use self::p::P as Q;";
         let found = broken([("r/mod.rs", room), ("r/p.rs", "use crate::r::q::X;"), ("r/q.rs", way)]);
-        assert!(found.len() == 1 && found[0].starts_with("a circle in src/r/: p.rs -> q.rs"), "{way}: {found:?}");
+        assert!(found.len() == 1 && found[0].starts_with("a circle in lib/src/r/: p.rs -> q.rs"), "{way}: {found:?}");
     }
 }
 
 #[test]
 fn a_file_that_imports_from_its_own_mod_file_is_in_a_circle_with_it() {
     let found = broken([("r/mod.rs", "mod p; pub struct R; fn f() { p::g() }"), ("r/p.rs", "use crate::r::R;")]);
-    assert!(found[0].starts_with("a circle in src/r/: mod.rs -> p.rs"), "{found:?}");
-}
-
-#[test]
-fn a_mod_file_may_re_export_only_from_its_own_folder() {
-    let files = [("input/mod.rs", "pub use crate::job::plan::Plan;"), ("job/plan.rs", "")];
-    assert_eq!(broken(files).len(), 1);
+    assert!(found[0].starts_with("a circle in lib/src/r/: mod.rs -> p.rs"), "{found:?}");
 }
 
 #[test]
 fn every_rule_of_direction_holds() {
     let wrong = [
-        ("geometry/a.rs", "config/a.rs"),
-        ("mesh/a.rs", "job/options.rs"),
-        ("voronoi/mod.rs", "verify/mod.rs"),
-        ("gpu/twins/a.rs", "cli.rs"),
-        ("triangulation/a.rs", "job/durable/a.rs"),
-        ("input/las/a.rs", "job/mod.rs"),
-        ("output/gltf/a.rs", "config/mod.rs"),
-        ("verify/a.rs", "job/options.rs"),
-        ("verify/a.rs", "config/mod.rs"),
-        ("config/mod.rs", "job/records.rs"),
-        ("config/mod.rs", "input/source.rs"),
-        ("job/mod.rs", "config/mod.rs"),
-        ("job/run/a.rs", "verify/mod.rs"),
-        ("job/run/a.rs", "submit/mod.rs"),
-        ("verify/a.rs", "submit/mod.rs"),
-        ("job/preflight/a.rs", "init/mod.rs"),
-        ("init/a.rs", "job/run/a.rs"),
-        ("job/report/mod.rs", "cli.rs"),
-        ("job/plan/a.rs", "job/partition/a.rs"),
-        ("job/mesh/a.rs", "job/publish/a.rs"),
-        ("job/levels/a.rs", "job/run/a.rs"),
-        ("job/tiles/a.rs", "job/mod.rs"),
-        ("job/publish/a.rs", "job/report/mod.rs"),
-        ("job/durable/a.rs", "job/records.rs"),
-        ("job/durable/a.rs", "job/mesh/a.rs"),
-        ("job/progress/a.rs", "job/preflight/a.rs"),
-        ("job/progress/a.rs", "job/plan/a.rs"),
-        ("job/records.rs", "job/run/a.rs"),
-        ("job/preflight/a.rs", "job/run/a.rs"),
-        ("job/report/a.rs", "job/mod.rs"),
+        ("src", "view/a.rs", "config/mod.rs"),
+        ("src", "init/a.rs", "submit/mod.rs"),
+        ("src", "config/mod.rs", "init/mod.rs"),
+        ("crates/job/src", "plan/a.rs", "partition/a.rs"),
+        ("crates/job/src", "mesh/a.rs", "publish/a.rs"),
+        ("crates/job/src", "levels/a.rs", "run/a.rs"),
+        ("crates/job/src", "publish/a.rs", "report/mod.rs"),
+        ("crates/job/src", "durable/a.rs", "records.rs"),
+        ("crates/job/src", "durable/a.rs", "mesh/a.rs"),
+        ("crates/job/src", "progress/a.rs", "preflight/a.rs"),
+        ("crates/job/src", "progress/a.rs", "plan/a.rs"),
+        ("crates/job/src", "records.rs", "run/a.rs"),
+        ("crates/job/src", "preflight/a.rs", "run/a.rs"),
     ];
     let right = [
-        ("config/mod.rs", "job/options.rs"),
-        ("config/mod.rs", "output/options.rs"),
-        ("config/mod.rs", "warnings.rs"),
-        ("verify/a.rs", "output/gltf/read.rs"),
-        ("job/publish/a.rs", "job/plan/a.rs"),
-        ("job/mesh/a.rs", "job/records.rs"),
-        ("job/tiles/a.rs", "job/durable/a.rs"),
-        ("job/report/a.rs", "job/levels/a.rs"),
-        ("job/run/a.rs", "job/publish/a.rs"),
-        ("job/mod.rs", "job/run/mod.rs"),
-        ("cli.rs", "job/options.rs"),
-        ("init/a.rs", "config/mod.rs"),
-        ("init/a.rs", "job/preflight/a.rs"),
+        ("src", "cli.rs", "config/mod.rs"),
+        ("src", "init/a.rs", "config/mod.rs"),
+        ("crates/job/src", "publish/a.rs", "plan/a.rs"),
+        ("crates/job/src", "mesh/a.rs", "records.rs"),
+        ("crates/job/src", "tiles/a.rs", "durable/a.rs"),
+        ("crates/job/src", "report/a.rs", "levels/a.rs"),
+        ("crates/job/src", "run/a.rs", "publish/a.rs"),
     ];
-    let count = |(from, to): (&str, &str)| {
+    let count = |(of, from, to): (&str, &str, &str)| {
         let path = to.trim_end_matches(".rs").trim_end_matches("/mod").replace('/', "::");
-        broken([(from, format!("use crate::{path}::Item;").as_str()), (to, "")]).len()
+        broken_in(of, [(from, format!("use crate::{path}::Item;").as_str()), (to, "")]).len()
     };
     assert_eq!(wrong.map(count), wrong.map(|_| 1));
     assert_eq!(right.map(count), right.map(|_| 0));
 }
 
-/// The calls that change files. `src/disk.rs` makes them for a job, so that tests can make up what a power failure leaves.
+/// The calls that change files. `crates/sys/src/disk.rs` makes them for a job, so that tests can make up what a power failure leaves.
 const CHANGES: [&str; 12] = [
     "fs::rename(",
     "fs::remove_",
@@ -197,17 +188,16 @@ const CHANGES: [&str; 12] = [
 
 #[test]
 fn a_job_changes_files_only_through_the_layer_that_tests_can_watch() {
-    let files = real_files();
-    let of_job = files.iter().filter(|(name, _)| name.starts_with("job/") || name.starts_with("output/"));
-    for (name, text) in of_job {
-        let code = text.split("#[cfg(test)]").next().unwrap();
-        let code = code.replace("PointFile::create", "");
-        let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
-        let around: Vec<&str> = lines.filter(|line| CHANGES.iter().any(|call| line.contains(call))).collect();
-        assert!(around.is_empty(), "src/{name} goes around src/disk.rs: {around:?}");
+    for of in ["crates/job/src", "crates/tiles/src"] {
+        for (name, text) in real_files(Path::new(of)) {
+            let code = text.split("#[cfg(test)]").next().unwrap();
+            let code = code.replace("PointFile::create", "");
+            let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+            let around: Vec<&str> = lines.filter(|line| CHANGES.iter().any(|call| line.contains(call))).collect();
+            assert!(around.is_empty(), "{of}/{name} goes around crates/sys/src/disk.rs: {around:?}");
+        }
     }
-    assert!(
-        CHANGES.iter().filter(|call| files["disk.rs"].contains(**call)).count() >= 7,
-        "the calls have other names now"
-    );
+    let disk = &real_files(Path::new("crates/sys/src"))["disk.rs"];
+    let known = CHANGES.iter().filter(|call| disk.contains(**call)).count();
+    assert!(known >= 7, "the calls have other names now");
 }

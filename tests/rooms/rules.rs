@@ -1,109 +1,81 @@
-//! The rules: which room may import which. A broken rule gives a sentence that names the arrow.
+//! The rules inside a crate: which module may import which. Between crates the compiler holds them. A broken rule gives a sentence that names
+//! the arrow.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use crate::house::Arrow;
 
-/// No file in `rooms` imports anything from `never`. A room is a folder, or a file that is named without its ending.
+/// No file in `rooms` of a crate imports anything from `never`. A room is a folder, or a file that is named without its ending.
 struct Rule {
+    of: &'static str,
     rooms: &'static [&'static str],
     never: &'static [&'static str],
     why: &'static str,
 }
 
 /// The rooms of a job's steps, in order. Each imports only from those before it.
-const STEPS: [&str; 6] = ["job/plan", "job/partition", "job/mesh", "job/tiles", "job/levels", "job/publish"];
+const STEPS: [&str; 6] = ["plan", "partition", "mesh", "tiles", "levels", "publish"];
 
-const RULES: [Rule; 10] = [
+const JOB: &str = "crates/job/src";
+const PROGRAM: &str = "src";
+
+const RULES: [Rule; 7] = [
     Rule {
-        rooms: &["breaklines"],
-        never: &["input", "output", "gpu", "voronoi", "triangulation", "mesh"],
-        why: "breaklines are lattice integers, not files",
-    },
-    Rule {
-        rooms: &["breaklines", "geometry", "mesh", "voronoi", "gpu", "triangulation", "input", "output"],
-        never: &["config", "job", "init", "submit", "verify", "view", "cli"],
-        why: "a library room knows no job",
-    },
-    Rule {
-        rooms: &["verify"],
-        never: &["config", "job", "init", "submit", "view", "cli"],
-        why: "the proof shares nothing with the job",
-    },
-    Rule {
+        of: PROGRAM,
         rooms: &["view"],
-        never: &["config", "job", "init", "submit", "verify", "cli"],
+        never: &["config", "init", "submit", "cli"],
         why: "the server knows files, no job",
     },
+    Rule { of: PROGRAM, rooms: &["init"], never: &["submit", "view", "cli"], why: "init looks at a job, and runs none" },
     Rule {
-        rooms: &["init"],
-        never: &["submit", "verify", "view", "cli", "job/run", "job/mod"],
-        why: "init looks at a job, and runs none",
+        of: PROGRAM,
+        rooms: &["config"],
+        never: &["init", "submit", "view", "cli", "sample", "gpu_trial"],
+        why: "config knows options, and no command",
     },
     Rule {
-        rooms: &["job"],
-        never: &["config", "init", "submit", "verify", "view", "cli"],
-        why: "a job does not know where its options come from, nor who starts its tasks",
-    },
-    Rule {
-        rooms: &["job/durable", "job/progress"],
-        never: &[
-            "job/records",
-            "job/merge_records",
-            "job/plan",
-            "job/partition",
-            "job/mesh",
-            "job/tiles",
-            "job/levels",
-            "job/publish",
-        ],
+        of: JOB,
+        rooms: &["durable", "progress"],
+        never: &["records", "merge_records", "plan", "partition", "mesh", "tiles", "levels", "publish"],
         why: "durable and progress know no step",
     },
     Rule {
-        rooms: &["job/durable", "job/progress", "job/records", "job/merge_records", "job/options", "job/index"],
-        never: &["job/run", "job/preflight", "job/report", "job/mod"],
+        of: JOB,
+        rooms: &["durable", "progress", "records", "merge_records", "options", "index"],
+        never: &["run", "preflight", "report", "lib"],
         why: "what all steps share does not know the rooms that use it",
     },
     Rule {
+        of: JOB,
         rooms: &STEPS,
-        never: &["job/run", "job/preflight", "job/report", "job/mod"],
+        never: &["run", "preflight", "report", "lib"],
         why: "a step does not know who runs it",
     },
-    Rule {
-        rooms: &["job/preflight", "job/report"],
-        never: &["job/run", "job/mod"],
-        why: "only job/mod.rs imports job/run",
-    },
+    Rule { of: JOB, rooms: &["preflight", "report"], never: &["run", "lib"], why: "only lib.rs imports run" },
 ];
 
-/// Returns a sentence for every broken rule.
-pub(crate) fn broken(arrows: &[Arrow]) -> Vec<String> {
-    let directions = arrows.iter().filter_map(|arrow| Some(format!("{}: {}", text(arrow), broken_rule(arrow)?)));
-    directions.chain(circles(arrows)).collect()
+/// Returns a sentence for every rule that a crate breaks, whose sources are in the folder `of`.
+pub(crate) fn broken(of: &str, arrows: &[Arrow]) -> Vec<String> {
+    let directions = arrows.iter().filter_map(|arrow| Some(format!("{}: {}", text(of, arrow), broken_rule(of, arrow)?)));
+    directions.chain(circles(of, arrows)).collect()
 }
 
 /// Returns a line that describes the arrow and leads to it.
-fn text(arrow: &Arrow) -> String {
-    format!("src/{}:{} imports {} from src/{}", arrow.from, arrow.line, arrow.path, arrow.to)
+fn text(of: &str, arrow: &Arrow) -> String {
+    format!("{of}/{}:{} imports {} from {of}/{}", arrow.from, arrow.line, arrow.path, arrow.to)
 }
 
-fn broken_rule(arrow: &Arrow) -> Option<&'static str> {
+fn broken_rule(of: &str, arrow: &Arrow) -> Option<&'static str> {
     let (is_from, is_to) = (|room: &&str| is_in(&arrow.from, room), |room: &&str| is_in(&arrow.to, room));
-    let rule = RULES.iter().find(|rule| rule.rooms.iter().any(is_from) && rule.never.iter().any(is_to));
-    let step = |is: &dyn Fn(&&str) -> bool| STEPS.iter().position(is);
-    match (step(&is_from), step(&is_to)) {
-        _ if rule.is_some() => rule.map(|rule| rule.why),
-        (Some(from), Some(to)) if from < to => Some("a step imports only from the steps before it"),
-        _ if is_from(&"config") && !is_open_to_config(&arrow.to) => {
-            Some("config imports only options, errors, warnings, geometry and the text of paths")
-        }
-        _ => None,
+    let mut rules = RULES.iter().filter(|rule| rule.of == of);
+    let step = |is: &dyn Fn(&&str) -> bool| STEPS.iter().position(is).filter(|_| of == JOB);
+    match rules.find(|rule| rule.rooms.iter().any(is_from) && rule.never.iter().any(is_to)) {
+        Some(rule) => Some(rule.why),
+        None => match (step(&is_from), step(&is_to)) {
+            (Some(from), Some(to)) if from < to => Some("a step imports only from the steps before it"),
+            _ => None,
+        },
     }
-}
-
-fn is_open_to_config(file: &str) -> bool {
-    file.ends_with("/options.rs")
-        || ["config", "geometry", "error", "warnings", "path_text"].iter().any(|room| is_in(file, room))
 }
 
 fn is_in(file: &str, room: &str) -> bool {
@@ -112,15 +84,15 @@ fn is_in(file: &str, room: &str) -> bool {
 
 /// Finds circles in every folder, between its files and its sub-folders. A sub-folder counts as one, with everything in it. Where
 /// there is none, no files are in a circle either, in one room or in several.
-fn circles(arrows: &[Arrow]) -> Vec<String> {
+fn circles(of: &str, arrows: &[Arrow]) -> Vec<String> {
     let arrows: Vec<&Arrow> = arrows.iter().filter(|arrow| !arrow.passes_on).collect();
     let folders = |file: &str| -> Vec<String> { file.match_indices('/').map(|(at, _)| file[..=at].into()).collect() };
     let all: BTreeSet<String> = arrows.iter().flat_map(|arrow| folders(&arrow.from)).chain([String::new()]).collect();
-    all.iter().flat_map(|folder| circles_in(folder, &arrows)).collect()
+    all.iter().flat_map(|folder| circles_in(of, folder, &arrows)).collect()
 }
 
 /// Returns the shortest circles of a folder. A circle that shares an arrow with a shorter one is reported when that one is gone.
-fn circles_in(folder: &str, arrows: &[&Arrow]) -> Vec<String> {
+fn circles_in(of: &str, folder: &str, arrows: &[&Arrow]) -> Vec<String> {
     let mut graph = Graph::new();
     for arrow in arrows {
         if let (Some(from), Some(to)) = (entry(folder, &arrow.from), entry(folder, &arrow.to)) {
@@ -135,8 +107,8 @@ fn circles_in(folder: &str, arrows: &[&Arrow]) -> Vec<String> {
     for circle in circles {
         let edges: Vec<_> = circle.windows(2).map(|pair| (pair[0], pair[1])).collect();
         if edges.iter().all(|edge| !told.contains(edge)) {
-            let arrows: String = edges.iter().map(|(from, to)| format!("\n    {}", text(graph[from][to]))).collect();
-            texts.push(format!("a circle in src/{folder}: {}{arrows}", circle.join(" -> ")));
+            let arrows: String = edges.iter().map(|(from, to)| format!("\n    {}", text(of, graph[from][to]))).collect();
+            texts.push(format!("a circle in {of}/{folder}: {}{arrows}", circle.join(" -> ")));
             told.extend(edges);
         }
     }
