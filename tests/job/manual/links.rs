@@ -2,16 +2,38 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use super::markdown::{Page, pages, root};
+use super::markdown::{Page, developers_pages, pages, root};
+use crate::tileset::files_below;
 
 #[test]
 fn every_link_leads_somewhere() {
-    let pages = pages();
     let mut checked = 0;
-    for page in &pages {
+    let all: Vec<Page> = pages().into_iter().chain(developers_pages()).collect();
+    for page in &all {
         for link in page.links() {
             let wrong = complaint(page, &link);
             assert_eq!(wrong, None, "{}: {link}", page.path.display());
+            checked += 1;
+        }
+    }
+    assert!(checked > 100, "{checked}");
+}
+
+/// Developers find a file by the end of its path, without `crates/` and `src/`.
+#[test]
+fn sources_that_pages_for_developers_name_are_there() {
+    let folders = ["crates", "src", "benches", "tests/common", "tests/gpu", "tests/job", "tests/resume", "tests/rooms", "tests/shaders"].map(|name| root().join(name));
+    let relative = |path: PathBuf| path.strip_prefix(root()).unwrap().to_str().unwrap().to_owned();
+    let short = |path: String| match path.strip_prefix("crates/") {
+        Some(rest) => rest.replacen("/src/", "/", 1),
+        None => path,
+    };
+    let files: Vec<String> = folders.iter().flat_map(|folder| files_below(folder)).map(relative).map(short).collect();
+    let mut checked = 0;
+    for page in developers_pages() {
+        for name in page.code().into_iter().filter(|code| code.ends_with(".rs") && !code.contains(' ')) {
+            let is_there = files.iter().any(|file| format!("/{file}").ends_with(&format!("/{name}")));
+            assert!(is_there, "{}: there is no {name}", page.path.display());
             checked += 1;
         }
     }

@@ -25,10 +25,20 @@ pub(super) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// Where notes for developers are.
+const NOTES: &str = "docs/notes";
+
 /// Returns README and all pages below `docs`.
 pub(super) fn pages() -> Vec<Page> {
     let mut paths = vec![PathBuf::from("README.md")];
     find(Path::new("docs"), &mut paths);
+    paths.into_iter().filter(|path| !path.starts_with(NOTES)).map(Page::read).collect()
+}
+
+/// Returns the pages for developers.
+pub(super) fn developers_pages() -> Vec<Page> {
+    let mut paths = ["ARCHITECTURE.md", "BENCHMARKS.md", "CONTRIBUTING.md"].map(PathBuf::from).to_vec();
+    find(Path::new(NOTES), &mut paths);
     paths.into_iter().map(Page::read).collect()
 }
 

@@ -28,6 +28,7 @@ pub struct RasterHead<'a> {
     pub corner: [f64; 2],
     /// The side of a cell, in units of x and y.
     pub cell_size: f64,
+    /// The coordinate system.
     pub system: &'a RasterSystem,
     /// Whose the data are, if the user says.
     pub copyright: Option<&'a str>,
