@@ -26,7 +26,12 @@ const RULES: [Rule; 7] = [
         never: &["config", "init", "submit", "cli"],
         why: "the server knows files, no job",
     },
-    Rule { of: PROGRAM, rooms: &["init"], never: &["submit", "view", "cli"], why: "init looks at a job, and runs none" },
+    Rule {
+        of: PROGRAM,
+        rooms: &["init"],
+        never: &["submit", "view", "cli"],
+        why: "init looks at a job, and runs none",
+    },
     Rule {
         of: PROGRAM,
         rooms: &["config"],
@@ -56,7 +61,8 @@ const RULES: [Rule; 7] = [
 
 /// Returns a sentence for every rule that a crate breaks, whose sources are in the folder `of`.
 pub(crate) fn broken(of: &str, arrows: &[Arrow]) -> Vec<String> {
-    let directions = arrows.iter().filter_map(|arrow| Some(format!("{}: {}", text(of, arrow), broken_rule(of, arrow)?)));
+    let directions =
+        arrows.iter().filter_map(|arrow| Some(format!("{}: {}", text(of, arrow), broken_rule(of, arrow)?)));
     directions.chain(circles(of, arrows)).collect()
 }
 
@@ -107,7 +113,8 @@ fn circles_in(of: &str, folder: &str, arrows: &[&Arrow]) -> Vec<String> {
     for circle in circles {
         let edges: Vec<_> = circle.windows(2).map(|pair| (pair[0], pair[1])).collect();
         if edges.iter().all(|edge| !told.contains(edge)) {
-            let arrows: String = edges.iter().map(|(from, to)| format!("\n    {}", text(of, graph[from][to]))).collect();
+            let arrows: String =
+                edges.iter().map(|(from, to)| format!("\n    {}", text(of, graph[from][to]))).collect();
             texts.push(format!("a circle in {of}/{folder}: {}{arrows}", circle.join(" -> ")));
             told.extend(edges);
         }

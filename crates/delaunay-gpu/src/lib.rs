@@ -4,7 +4,7 @@
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
-pub mod benefit;
+pub mod figures;
 #[cfg(not(feature = "wgpu"))]
 mod no_device;
 #[cfg(feature = "wgpu")]

@@ -1,13 +1,13 @@
 //! What takes the place of the executor in a build without the feature `wgpu`: there is never one.
 
-use crate::benefit::{GpuBenefit, GpuFigures};
+use crate::figures::GpuFigures;
 use crate::options::GpuOptions;
 use delaunay::geometry::Site;
 use delaunay::voronoi::mesh_reply::MeshReply;
 
 /// Whether a job needs the GPU or only profits from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GpuUse {
+pub(crate) enum GpuUse {
     /// The user asked for a GPU.
     Required,
     /// The job can do without.
@@ -15,12 +15,14 @@ pub enum GpuUse {
 }
 
 /// A GPU that makes meshes. There is none.
-pub enum Executor {}
+pub(crate) enum Executor {}
 
 impl Executor {
+    /// Returns a sentence about this build.
+    ///
     /// # Errors
-    /// Always: a sentence about this build.
-    pub fn start(_: &GpuOptions, _: GpuUse, _: u64) -> Result<Executor, String> {
+    /// Always.
+    pub(crate) fn start(_: &GpuOptions, _: GpuUse, _: u64) -> Result<Executor, String> {
         Err("this build of gdt-batch uses no GPU: build it with the feature gpu".into())
     }
 
@@ -44,7 +46,11 @@ impl Executor {
         match *self {}
     }
 
-    pub(crate) fn benefit(&self) -> &GpuBenefit {
+    pub(crate) fn note(&self, _: bool, _: usize, _: f64) {
+        match *self {}
+    }
+
+    pub(crate) fn note_in_vain(&self, _: &MeshReply) {
         match *self {}
     }
 

@@ -1,9 +1,9 @@
 //! The choice of backend for a leaf: the pipeline on the CPU, with a GPU, or the reference. What the pipeline rejects is divided and
 //! conquered.
 
-use crate::benefit::GpuFigures;
 #[cfg(feature = "wgpu")]
 use crate::executor::{Executor, GpuUse};
+use crate::figures::GpuFigures;
 #[cfg(not(feature = "wgpu"))]
 use crate::no_device::{Executor, GpuUse};
 use crate::options::GpuOptions;
@@ -153,8 +153,8 @@ impl Triangulator {
         let is_helped = done.as_ref().is_ok_and(|(_, counts)| counts.on_gpu > 0);
         match done.is_ok() {
             // It has cost more than a leaf alone.
-            true if asked && !is_helped => gpu.benefit().note_in_vain(&reply),
-            true => gpu.benefit().note(is_helped, sites.len(), own_cpu_seconds() - begun),
+            true if asked && !is_helped => gpu.note_in_vain(&reply),
+            true => gpu.note(is_helped, sites.len(), own_cpu_seconds() - begun),
             // The leaf does not suit the pipeline, with a GPU or without.
             false => {}
         }

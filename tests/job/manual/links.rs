@@ -22,7 +22,18 @@ fn every_link_leads_somewhere() {
 /// Developers find a file by the end of its path, without `crates/` and `src/`.
 #[test]
 fn sources_that_pages_for_developers_name_are_there() {
-    let folders = ["crates", "src", "benches", "tests/common", "tests/gpu", "tests/job", "tests/resume", "tests/rooms", "tests/shaders"].map(|name| root().join(name));
+    let folders = [
+        "crates",
+        "src",
+        "benches",
+        "tests/common",
+        "tests/gpu",
+        "tests/job",
+        "tests/resume",
+        "tests/rooms",
+        "tests/shaders",
+    ]
+    .map(|name| root().join(name));
     let relative = |path: PathBuf| path.strip_prefix(root()).unwrap().to_str().unwrap().to_owned();
     let short = |path: String| match path.strip_prefix("crates/") {
         Some(rest) => rest.replacen("/src/", "/", 1),

@@ -8,7 +8,8 @@
 //! A worker that waits for its mesh does other work of the job meanwhile, so that many leaves wait. If there is none, and the job could do
 //! without the GPU, the worker soon does the leaf itself.
 
-use crate::benefit::{GpuBenefit, GpuFigures};
+use crate::figures::GpuFigures;
+use crate::on_device::benefit::GpuBenefit;
 use crate::on_device::device;
 use crate::on_device::device::{AdapterRequest, MAX_SIDE};
 use crate::on_device::error::GpuError;
@@ -19,8 +20,8 @@ use crate::on_device::fake_engine::FakeEngine;
 use crate::on_device::filled_atlas::{AtlasLimits, MAX_PIXELS};
 use crate::on_device::gpu_thread::{Filling, GpuState, GpuThread, MANY_SITES, MeshRequest};
 use crate::on_device::mesh_engine::{GpuMeshEngine, MAX_IN_FLIGHT, MeshEngine};
-use crate::options::{GpuOptions, TextureSide};
 use crate::on_device::recording::GpuStep;
+use crate::options::{GpuOptions, TextureSide};
 use delaunay::geometry::Site;
 use delaunay::voronoi::mesh_reply::MeshReply;
 use delaunay::voronoi::texture_request::TextureResolution;
@@ -202,9 +203,14 @@ impl Executor {
         steps.into_iter().filter(|(_, seconds)| *seconds > 0.0).collect()
     }
 
-    /// Returns what is known of its benefit.
-    pub(crate) fn benefit(&self) -> &GpuBenefit {
-        &self.benefit
+    /// Notes that a leaf of `sites` sites took `seconds` of processor time, with help or alone.
+    pub(crate) fn note(&self, is_helped: bool, sites: usize, seconds: f64) {
+        self.benefit.note(is_helped, sites, seconds);
+    }
+
+    /// Notes that help was asked for a leaf, and that `reply` could not be used.
+    pub(crate) fn note_in_vain(&self, reply: &MeshReply) {
+        self.benefit.note_in_vain(reply);
     }
 
     /// Returns what it did so far.

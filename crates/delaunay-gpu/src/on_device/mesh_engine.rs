@@ -8,9 +8,9 @@ use crate::on_device::engine::{GpuEngine, PendingReadback};
 use crate::on_device::error::GpuError;
 use crate::on_device::filled_atlas::{AtlasLimits, FilledAtlas};
 use crate::on_device::landed::Landed;
-use crate::options::VoronoiMethod;
 use crate::on_device::recording::Recording;
 use crate::on_device::staging::StagingPool;
+use crate::options::VoronoiMethod;
 use delaunay::voronoi::texture_request::TextureResolution;
 use std::sync::Arc;
 

@@ -5,6 +5,7 @@
 //! the meshes of leaves from a thread of its own, many leaves at a time. The crate `delaunay` completes these meshes and proves them.
 
 pub mod atlas;
+mod benefit;
 pub mod buffer_id;
 pub mod buffers;
 pub mod device;

@@ -106,8 +106,8 @@ mod tests {
     use super::*;
     use crate::on_device::atlas::Atlas;
     use crate::on_device::buffer_id::BufferId;
-    use crate::options::VoronoiMethod;
     use crate::on_device::timestamps::STAMPS;
+    use crate::options::VoronoiMethod;
     use delaunay::voronoi::texture_request::TextureRequest;
 
     fn passes<'a>(parts: &'a [Part]) -> impl Iterator<Item = &'a Pass> {

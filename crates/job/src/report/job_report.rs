@@ -14,7 +14,7 @@ use crate::publish::raster::write_raster::RasterStats;
 use crate::report::breakline_report::BreaklineReport;
 use crate::tiles::write_tile::TileStats;
 use delaunay::voronoi::counts::STEP_NAMES;
-use delaunay_gpu::benefit::GpuFigures;
+use delaunay_gpu::figures::GpuFigures;
 use lattice::Lattice;
 use lattice::VertexDigest;
 use points::options::InputOptions;

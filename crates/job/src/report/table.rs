@@ -5,7 +5,7 @@ use crate::report::breakline_report::BreaklineReport;
 use crate::report::job_report::{Report, SlowestPart, StepSeconds};
 use crate::report::skipped_inputs::write_skipped;
 use delaunay::triangulation::TriangulationCounts;
-use delaunay_gpu::benefit::GpuFigures;
+use delaunay_gpu::figures::GpuFigures;
 use points::NetworkTraffic;
 use std::fmt;
 use sys::terminal::one_line;

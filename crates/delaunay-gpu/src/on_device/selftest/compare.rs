@@ -6,12 +6,12 @@ use crate::on_device::engine::GpuEngine;
 use crate::on_device::error::GpuError;
 use crate::on_device::filled_atlas::FilledAtlas;
 use crate::on_device::mesh_steps::FLIP_ROUNDS;
-use crate::options::VoronoiMethod;
 use crate::on_device::recording::Recording;
 use crate::on_device::twins::atlas;
 use crate::on_device::twins::atlas::{AtlasDiagram, MeshOnDevice};
 use crate::on_device::twins::c4_flip::{FlipState, flip_round};
 use crate::on_device::twins::predicates::decide;
+use crate::options::VoronoiMethod;
 use delaunay::geometry::Site;
 use serde::Serialize;
 

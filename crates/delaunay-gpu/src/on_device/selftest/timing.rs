@@ -5,9 +5,9 @@ use crate::on_device::buffers::BufferSet;
 use crate::on_device::engine::GpuEngine;
 use crate::on_device::error::GpuError;
 use crate::on_device::filled_atlas::FilledAtlas;
-use crate::options::VoronoiMethod;
 use crate::on_device::recording::{GpuStep, Recording};
 use crate::on_device::timestamps::StepNanoseconds;
+use crate::options::VoronoiMethod;
 use serde::Serialize;
 use std::time::Instant;
 

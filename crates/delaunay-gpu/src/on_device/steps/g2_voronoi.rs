@@ -2,10 +2,10 @@
 
 use crate::on_device::atlas::{Atlas, AtlasLeaf, BLOCK_SIDE};
 use crate::on_device::buffer_id::BufferId::{Blocks, Flood, Labels, Leaves, North, South, Texture, Words};
-use crate::options::VoronoiMethod;
 use crate::on_device::recording::{GpuCommand, GpuStep, Recording, ShaderProgram, line, program};
 use crate::on_device::steps::{BLOCK_BYTES, WORDS_BYTES, grid, pixel_bytes};
 use crate::on_device::texture_size::TextureSize;
+use crate::options::VoronoiMethod;
 
 const COLUMNS: ShaderProgram = program!(
     "atlas/g2_voronoi_exact", uses "atlas/leaf", uses "atlas/block", "columns",

@@ -14,8 +14,8 @@ pub(super) use g3_islands::ISLANDS_PER_BLOCK;
 
 use crate::on_device::atlas::Atlas;
 use crate::on_device::buffer_id::BufferId::{Blocks, Flags, Leaves, Sites};
-use crate::options::VoronoiMethod;
 use crate::on_device::recording::{GpuCommand, MAX_WORKGROUPS, Recording};
+use crate::options::VoronoiMethod;
 use delaunay::geometry::Site;
 
 /// Bytes of an entry of the table of blocks.

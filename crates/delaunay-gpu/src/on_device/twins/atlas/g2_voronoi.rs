@@ -1,10 +1,10 @@
 //! Step G2 on an atlas: the twin of `shaders/atlas/g2_voronoi_exact.wgsl` and `shaders/atlas/g2_voronoi_jfa.wgsl`.
 
 use crate::on_device::atlas::Atlas;
-use crate::options::VoronoiMethod;
 use crate::on_device::twins::atlas::{pixels_of, size_of};
 use crate::on_device::twins::label::NONE;
 use crate::on_device::twins::{voronoi_exact, voronoi_jfa};
+use crate::options::VoronoiMethod;
 
 /// Returns the label of every pixel; that of the frame is the colour of infinity.
 pub fn voronoi(atlas: &Atlas, texture: &[u32], method: VoronoiMethod) -> Vec<u32> {

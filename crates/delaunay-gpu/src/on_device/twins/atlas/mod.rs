@@ -20,9 +20,9 @@ pub use give_back::{MeshOnDevice, give_back};
 
 use crate::on_device::atlas::{Atlas, AtlasLeaf};
 use crate::on_device::mesh_steps::FLIP_ROUNDS;
-use crate::options::VoronoiMethod;
 use crate::on_device::texture_size::TextureSize;
 use crate::on_device::twins::c4_flip::{FlipState, flip_round};
+use crate::options::VoronoiMethod;
 use delaunay::geometry::Site;
 
 /// Does all steps on the leaves of `atlas`, and returns what comes back to the CPU; see [`crate::on_device::returned`]. `sites` has those of all
