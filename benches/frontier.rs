@@ -6,11 +6,11 @@
 
 mod points;
 
-use gdt_batch::geometry::Site;
-use gdt_batch::job::mesh::final_triangles::{TriangleState, find_final};
-use gdt_batch::job::partition::tree::Cell;
-use gdt_batch::job::plan::budget::BYTES_PER_MERGED_SITE;
-use gdt_batch::triangulation::divide_and_conquer;
+use delaunay::geometry::Site;
+use delaunay::triangulation::divide_and_conquer;
+use job::mesh::final_triangles::{TriangleState, find_final};
+use job::partition::tree::Cell;
+use job::plan::budget::BYTES_PER_MERGED_SITE;
 use points::{Random, distinct, gaussian, median, uniform};
 use std::time::Instant;
 

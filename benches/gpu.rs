@@ -8,11 +8,11 @@
 mod instant;
 mod points;
 
-use gdt_batch::geometry::{Bounds, Site};
-use gdt_batch::mesh::half_edge::HalfEdgeMesh;
-use gdt_batch::voronoi::counts::{PipelineCounts, STEP_NAMES};
-use gdt_batch::voronoi::rejection::Rejection;
-use gdt_batch::voronoi::{PipelineBuffers, triangulate};
+use delaunay::geometry::{Bounds, Site};
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::voronoi::counts::{PipelineCounts, STEP_NAMES};
+use delaunay::voronoi::rejection::Rejection;
+use delaunay::voronoi::{PipelineBuffers, triangulate};
 use instant::Answer;
 use points::{gaussian, median, uniform};
 use std::hint::black_box;

@@ -6,8 +6,8 @@
 
 mod points;
 
-use gdt_batch::geometry::Site;
-use gdt_batch::triangulation::{canonical, reference};
+use delaunay::geometry::Site;
+use delaunay::triangulation::{canonical, reference};
 use points::{Random, distinct, gaussian, median, uniform};
 use std::time::Instant;
 

@@ -11,8 +11,8 @@
 
 mod jobs;
 
-use gdt_batch::job::progress::stage::ProgressOutput;
-use gdt_batch::job::report::job_report::Report;
+use job::progress::stage::ProgressOutput;
+use job::report::job_report::Report;
 use jobs::{FULL, Outcome, PLAIN, as_las, default_file, empty, write_config};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -65,7 +65,7 @@ fn decode(file: &Path) -> Outcome<f64> {
 fn job(file: &Path, output: &Path, look: &str) -> Outcome<Report> {
     let config = write_config(file, output, look)?;
     let start = Instant::now();
-    let mut report = gdt_batch::job::run(&gdt_batch::config::load(&config)?, ProgressOutput::Quiet)?;
+    let mut report = job::run(&gdt_batch::config::load(&config)?, ProgressOutput::Quiet)?;
     report.wall_s = start.elapsed().as_secs_f64();
     empty(output)?;
     Ok(report)

@@ -9,10 +9,10 @@ mod leaves;
 mod points;
 
 use delaunator::Point;
-use gdt_batch::geometry::Site;
-use gdt_batch::triangulation::reference;
-use gdt_batch::voronoi::counts::{PipelineCounts, STEP_NAMES};
-use gdt_batch::voronoi::{PipelineBuffers, triangulate};
+use delaunay::geometry::Site;
+use delaunay::triangulation::reference;
+use delaunay::voronoi::counts::{PipelineCounts, STEP_NAMES};
+use delaunay::voronoi::{PipelineBuffers, triangulate};
 use leaves::{Case, cases, cpu_time, cut};
 use points::median;
 use spade::{DelaunayTriangulation, Point2, Triangulation};

@@ -17,28 +17,29 @@
 mod points;
 
 use delaunator::Point;
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::buffers::BufferSet;
-use gdt_batch::gpu::device::{self, AdapterRequest, Device};
-use gdt_batch::gpu::engine::GpuEngine;
-use gdt_batch::gpu::error::GpuError;
-use gdt_batch::gpu::executor::{Executor, GpuUse};
-use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas, MAX_PIXELS};
-use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
-use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
-use gdt_batch::gpu::recording::{GpuStep, Recording};
-use gdt_batch::gpu::timestamps::StepNanoseconds;
-use gdt_batch::gpu::twins::atlas::{
+use delaunay::geometry::Site;
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::voronoi::counts::{PipelineCounts, STEP_NAMES};
+use delaunay::voronoi::rejection::Rejection;
+use delaunay::voronoi::texture_request::{TextureRequest, TextureResolution};
+use delaunay::voronoi::{PipelineBuffers, triangulate, triangulate_with};
+use delaunay_gpu::buffer_id::BufferId;
+use delaunay_gpu::buffers::BufferSet;
+use delaunay_gpu::device;
+use delaunay_gpu::device::{AdapterRequest, Device};
+use delaunay_gpu::engine::GpuEngine;
+use delaunay_gpu::error::GpuError;
+use delaunay_gpu::executor::{Executor, GpuUse};
+use delaunay_gpu::filled_atlas::{AtlasLimits, FilledAtlas, MAX_PIXELS};
+use delaunay_gpu::mesh_steps::FLIP_ROUNDS;
+use delaunay_gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
+use delaunay_gpu::recording::{GpuStep, Recording};
+use delaunay_gpu::reference_kernels::atlas::{
     AtlasDiagram, MeshOnDevice, WrittenSites, count, find_vertices, give_back, make_triangles, remove_islands, voronoi,
     write_sites,
 };
-use gdt_batch::gpu::twins::c4_flip::{FlipState, flip_round};
-use gdt_batch::mesh::half_edge::HalfEdgeMesh;
-use gdt_batch::voronoi::counts::{PipelineCounts, STEP_NAMES};
-use gdt_batch::voronoi::rejection::Rejection;
-use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
-use gdt_batch::voronoi::{PipelineBuffers, triangulate, triangulate_with};
+use delaunay_gpu::reference_kernels::c4_flip::{FlipState, flip_round};
+use delaunay_gpu::timestamps::StepNanoseconds;
 use points::{gaussian, median, uniform};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 use std::cell::RefCell;

@@ -8,9 +8,9 @@
 mod leaves;
 mod points;
 
-use gdt_batch::geometry::Site;
-use gdt_batch::triangulation::{divide_and_conquer, reference};
-use gdt_batch::voronoi::{PipelineBuffers, triangulate};
+use delaunay::geometry::Site;
+use delaunay::triangulation::{divide_and_conquer, reference};
+use delaunay::voronoi::{PipelineBuffers, triangulate};
 use leaves::{Case, cases, cpu_time, cut};
 use points::median;
 use std::error::Error;

@@ -18,8 +18,8 @@
 mod jobs;
 
 use cpu_time::{ProcessTime, ThreadTime};
-use gdt_batch::job::progress::stage::ProgressOutput;
-use gdt_batch::job::report::job_report::Report;
+use job::progress::stage::ProgressOutput;
+use job::report::job_report::Report;
 use jobs::{FULL, Outcome, PLAIN, as_las, default_file, empty, write_config};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -111,7 +111,7 @@ fn watched_job(config: &Path) -> Outcome<Vec<Sample>> {
     let (start, report, moments) = std::thread::scope(|scope| {
         let watching = scope.spawn(|| watch(&ended));
         let start = Instant::now();
-        let report = gdt_batch::job::run(&options, ProgressOutput::Quiet);
+        let report = job::run(&options, ProgressOutput::Quiet);
         ended.store(true, Ordering::Relaxed);
         (start, report, watching.join().expect("the watching thread does not panic"))
     });

@@ -16,26 +16,3 @@ mod shell_word;
 pub mod submit;
 #[cfg(feature = "viewer")]
 pub mod view;
-
-pub use breaklines;
-pub use delaunay::{mesh, voronoi};
-pub use delaunay_gpu as gpu;
-pub use job;
-pub use points as input;
-pub use sys::{Error, Result, Warnings, error, interrupt, positional_io, say, shortage, terminal, threads};
-pub use tiles as output;
-pub use verify;
-
-/// Sites, and the lattice that they lie on.
-pub mod geometry {
-    pub use ::lattice;
-    pub use ::lattice::VertexDigest;
-    pub use delaunay::geometry::*;
-}
-
-/// Triangulation of leaves.
-pub mod triangulation {
-    pub use delaunay::triangulation::*;
-    pub use delaunay_gpu::triangulation_options as options;
-    pub use delaunay_gpu::triangulator::Triangulator;
-}

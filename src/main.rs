@@ -5,30 +5,29 @@
 use clap::Parser;
 use gdt_batch::cli::{Cli, CliCommand, PrintOptions, ViewOptions};
 use gdt_batch::init::NewConfiguration;
-use gdt_batch::input::histogram::Histogram;
-use gdt_batch::input::info::{SourceDescription, describe};
-use gdt_batch::job;
-use gdt_batch::job::options::{JobOptions, RunOptions, Threads};
-use gdt_batch::job::phase::{Phase, PhaseTasks, Task};
-use gdt_batch::job::preflight::check;
-use gdt_batch::job::progress::stage::ProgressOutput;
-use gdt_batch::job::report::job_report::Report;
-use gdt_batch::job::report::skipped_inputs::skipped_summary;
-use gdt_batch::job::report::task_outcome::TaskOutcome;
-use gdt_batch::output::file_names::OutputFiles;
 use gdt_batch::submit::local::LocalEngine;
 use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
-use gdt_batch::threads::{self, on_threads};
-use gdt_batch::verify::Conclusion;
-use gdt_batch::{
-    Error, Result, completions, config, init, input, interrupt, manual, sample, say, shortage, terminal, verify,
-};
+use gdt_batch::{completions, config, init, manual, sample};
+use job::options::{JobOptions, RunOptions, Threads};
+use job::phase::{Phase, PhaseTasks, Task};
+use job::preflight::check;
+use job::progress::stage::ProgressOutput;
+use job::report::job_report::Report;
+use job::report::skipped_inputs::skipped_summary;
+use job::report::task_outcome::TaskOutcome;
+use points::histogram::Histogram;
+use points::info::{SourceDescription, describe};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use sys::threads;
+use sys::threads::on_threads;
+use sys::{Error, Result, interrupt, say, shortage, terminal};
+use tiles::file_names::OutputFiles;
+use verify::Conclusion;
 
 fn main() -> ExitCode {
     match shortage::listen().and_then(|()| run(command_line())) {
@@ -212,12 +211,12 @@ fn write_configuration(clouds: &[PathBuf], file: &Path, force: bool, print: Prin
     let made = on_threads(threads::available(), || init::init(clouds, file, force))?;
     if is_printed {
         print_text(&made.text)?;
-        return made.misfit.map_or(Ok(ExitCode::SUCCESS), Err);
+        return made.obstacle.map_or(Ok(ExitCode::SUCCESS), Err);
     }
     show_configuration(&made, file, print)?;
-    let Some(misfit) = made.misfit else { return Ok(ExitCode::SUCCESS) };
-    say(&format!("error: {} is written, but its job would stop: {misfit}", file.display()));
-    Ok(ExitCode::from(misfit.exit_code()))
+    let Some(obstacle) = made.obstacle else { return Ok(ExitCode::SUCCESS) };
+    say(&format!("error: {} is written, but its job would stop: {obstacle}", file.display()));
+    Ok(ExitCode::from(obstacle.exit_code()))
 }
 
 /// Prints what a configuration says that was written. If that fails, it is there nevertheless: to write it again would be refused.
@@ -259,8 +258,8 @@ fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: Print
 #[cfg(feature = "viewer")]
 fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
     use gdt_batch::view::{View, browser};
-    if !gdt_batch::output::page::is_built_in() {
-        return Err(Error::Config(gdt_batch::output::page::NOT_BUILT_IN.into()));
+    if !tiles::page::is_built_in() {
+        return Err(Error::Config(tiles::page::NOT_BUILT_IN.into()));
     }
     let wanted = std::net::SocketAddr::new(options.address, options.port);
     let view = View::open(&options.directory, wanted, &options.host)?;
@@ -301,7 +300,7 @@ fn test_gpu(_: Option<&str>, _: Option<usize>, _: PrintOptions) -> Result<ExitCo
 fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<ExitCode> {
     for file in &named(files)? {
         let described = on_threads(threads::available(), || {
-            let source = input::open(file, &input::TextOptions::default())?;
+            let source = points::open(file, &points::TextOptions::default())?;
             let histogram = histogram.then(|| Histogram::of(&source)).transpose()?;
             SourceDescription { histogram, ..describe(&source) }.with_surface(&source)
         })?;
@@ -313,7 +312,7 @@ fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<
 /// Returns the files that a command line names: those of this machine, which must be there, and those that its URLs mean.
 fn named(files: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let of_one = |file: &PathBuf| match file.to_str() {
-        Some(url) if input::is_url(url) => input::remote_files(url),
+        Some(url) if points::is_url(url) => points::remote_files(url),
         _ if file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound) => {
             Err(Error::Config(format!("there is no file {}: correct its name", file.display())))
         }
@@ -329,7 +328,7 @@ fn print_result(result: &(impl Display + Serialize), print: PrintOptions) -> Res
     } else if print.quiet {
         return Ok(());
     } else {
-        terminal::harmless(&result.to_string())
+        terminal::escape_controls(&result.to_string())
     };
     print_text(&text)
 }
@@ -338,6 +337,6 @@ fn print_text(text: &str) -> Result<()> {
     match writeln!(std::io::stdout(), "{}", text.trim_end()) {
         // The reader has closed the pipe because it has read enough.
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
-        outcome => outcome.map_err(Error::io("write to", gdt_batch::error::STANDARD_OUTPUT)),
+        outcome => outcome.map_err(Error::io("write to", sys::error::STANDARD_OUTPUT)),
     }
 }

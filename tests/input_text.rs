@@ -7,10 +7,10 @@ mod common;
 use std::path::Path;
 
 use cloud::{Cloud, decode, file, lattice, read, read_bytes, read_with, rules, survives};
-use gdt_batch::Result;
-use gdt_batch::input::{FileFormat, Point, TextOptions, open};
+use points::{FileFormat, Point, TextOptions, open};
 use proptest::prelude::*;
 use rust_decimal::Decimal;
+use sys::Result;
 
 #[test]
 fn small_real_texts_of_every_layout_are_read() {

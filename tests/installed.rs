@@ -27,7 +27,7 @@ const FAULTS: [&str; 10] = [
 /// A program without the page says how to build one with it.
 #[test]
 fn view_says_how_it_is_built_in() {
-    if gdt_batch::output::page::is_built_in() {
+    if tiles::page::is_built_in() {
         return;
     }
     let output = Command::new(env!("CARGO_BIN_EXE_gdt-batch")).args(["view", "out"]).output().unwrap();

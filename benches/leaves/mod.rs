@@ -1,7 +1,7 @@
 //! The leaves that benchmarks of the kernel triangulate.
 
 use crate::points::{Random, distinct, gaussian, uniform};
-use gdt_batch::geometry::{Bounds, Site};
+use delaunay::geometry::{Bounds, Site};
 use std::path::PathBuf;
 
 /// The size of leaves in a job, by default.

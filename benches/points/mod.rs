@@ -1,6 +1,6 @@
 //! What the benchmarks share: generated sites, and the median.
 
-use gdt_batch::geometry::Site;
+use delaunay::geometry::Site;
 
 /// A small generator: xorshift64*.
 pub(crate) struct Random(pub(crate) u64);

@@ -2,8 +2,8 @@
 
 use crate::init::draft::{Draft, NeededLine, quoted};
 use crate::init::findings::{Findings, NO_UNIT_OF_HEIGHTS, rectangle, unit_of_heights};
-use crate::init::needs::Runnable;
 use crate::init::page::Page;
+use crate::init::required_options::Runnable;
 use job::plan::job_plan::Plan;
 use job::preflight::check::Preflight;
 use points::{Source, Unit};
@@ -14,7 +14,7 @@ pub(crate) const FIRST_WORDS: &str = "A job for gdt-batch";
 
 /// Returns the text of the configuration. `name` is that of its file for a shell, if it has one; `notes` are about files that are left out.
 pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String]) -> String {
-    let Runnable { draft, preflight, plan, misfit, offers, .. } = runnable;
+    let Runnable { draft, preflight, plan, obstacle, offers, .. } = runnable;
     let sources: Vec<&Source> = plan.inputs.iter().map(|input| &input.source).collect();
     let findings = Findings::of(draft, preflight, plan);
     let mut page = Page::default();
@@ -37,9 +37,9 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
     about_output(&mut page, draft, preflight);
     page.blank();
     page.set("[limits]");
-    page.say(&findings.room);
-    if let Some(misfit) = misfit {
-        page.say(&format!("It does not fit this machine: {misfit}."));
+    page.say(&findings.memory);
+    if let Some(obstacle) = obstacle {
+        page.say(&format!("It does not fit this machine: {obstacle}."));
     }
     page.need(draft.lines_of("limits"));
     page.offer("memory = \"4 GiB\"", "the most memory that the job may take; this is the default");
@@ -103,7 +103,7 @@ fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, (is_na
     }
 }
 
-/// Offers the middle of the area, to try things on.
+/// OfferedOptions the middle of the area, to try things on.
 fn about_area(page: &mut Page, sources: &[&Source]) {
     let Some([min, max]) = rectangle(sources) else { return };
     let within = |axis: usize, share: f64| min[axis] + (max[axis] - min[axis]) * share;

@@ -4,7 +4,7 @@ use crate::init::draft::Draft;
 use job::plan::job_plan::Plan;
 use job::preflight::check::Preflight;
 use job::progress::number_text::{grouped, mebibytes};
-use points::surface_doubts::listed;
+use points::surface_warnings::listed;
 use points::{Crs, FileFormat, Source, Unit};
 
 /// The most systems that a sentence names.
@@ -31,7 +31,7 @@ pub(crate) struct Findings {
     /// What the mesh will be.
     pub(crate) surface: String,
     /// What the job takes, and what this machine has.
-    pub(crate) room: String,
+    pub(crate) memory: String,
 }
 
 impl Findings {
@@ -49,7 +49,7 @@ impl Findings {
                 Some(surface) => format!("Surface: {surface}."),
                 None => "Surface: a sample of the points says nothing about it.".into(),
             },
-            room: room(preflight),
+            memory: memory(preflight),
         }
     }
 }
@@ -164,7 +164,7 @@ fn classes(sources: &[&Source], plan: &Plan) -> String {
     format!("Classes{of}: {}.", listed(&plan.sample))
 }
 
-fn room(preflight: &Preflight) -> String {
+fn memory(preflight: &Preflight) -> String {
     let free = |bytes: Option<u64>| bytes.map_or("unknown".into(), mebibytes);
     format!(
         "The job takes about {} of memory ({} are free on this machine), and about {} of disk while it runs ({} are free). The results: \

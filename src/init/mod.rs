@@ -8,14 +8,14 @@ mod clouds;
 mod config_file;
 mod config_folder;
 mod configuration;
-mod doubtful_heights;
 mod draft;
 mod findings;
 mod folder_files;
-mod needs;
-mod offers;
+mod offered_options;
 mod page;
 mod refusals;
+mod required_options;
+mod suspect_heights;
 mod systems;
 mod triangle;
 
@@ -24,9 +24,9 @@ use crate::init::config_file::{check_is_no_cloud, check_may_be_written, write};
 use crate::init::config_folder::ConfigFolder;
 use crate::init::configuration::{choice_of, summary_of, text_of, units_of};
 use crate::init::draft::{Draft, options_of};
-use crate::init::needs::runnable;
-use crate::init::page::harmless;
+use crate::init::page::escape_controls;
 use crate::init::refusals::with_way_out;
+use crate::init::required_options::runnable;
 use crate::shell_word::quoted;
 use job::durable::directory::JobDirectory;
 use job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
@@ -74,7 +74,7 @@ pub struct NewConfiguration {
     pub text: String,
     /// Why the job stops as it is: the user has to decide, or this machine has no room for it.
     #[serde(skip)]
-    pub misfit: Option<Error>,
+    pub obstacle: Option<Error>,
 }
 
 /// Makes a configuration for the clouds that `clouds` name, and writes it to `file`, unless that is `-`.
@@ -107,7 +107,7 @@ pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfigu
         unit: units_of(&found.preflight, &found.plan),
         check: found.preflight,
         text,
-        misfit: found.stop.or(found.misfit),
+        obstacle: found.stop.or(found.obstacle),
     })
 }
 
@@ -145,7 +145,7 @@ fn as_argument(file: &Path) -> String {
 impl fmt::Display for NewConfiguration {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Preflight { files, records, crs, surface, memory, disk, warnings, .. } = &self.check;
-        let mut row = |name: &str, value: String| writeln!(f, "{name:<9} {}", harmless(&value));
+        let mut row = |name: &str, value: String| writeln!(f, "{name:<9} {}", escape_controls(&value));
         row("files", format!("{} with {} points", grouped(files.len() as u64), grouped(*records)))?;
         row("unit", self.unit.clone())?;
         row("crs", crs.clone().unwrap_or_else(|| "none".into()))?;
@@ -157,12 +157,17 @@ impl fmt::Display for NewConfiguration {
         self.choices.iter().try_for_each(|line| row("decide", choice_of(line)))?;
         self.notes.iter().try_for_each(|note| row("note", note.clone()))?;
         for warning in warnings.iter() {
-            writeln!(f, "warning: {}", harmless(warning))?;
+            writeln!(f, "warning: {}", escape_controls(warning))?;
         }
         match &self.file {
             Some(file) => {
                 let name = file.display().to_string();
-                writeln!(f, "written to {}; run it: gdt-batch {}", harmless(&name), harmless(&as_argument(file)))
+                writeln!(
+                    f,
+                    "written to {}; run it: gdt-batch {}",
+                    escape_controls(&name),
+                    escape_controls(&as_argument(file))
+                )
             }
             None => Ok(()),
         }

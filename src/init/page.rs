@@ -17,7 +17,7 @@ impl Page {
     /// Writes a sentence as a comment.
     pub(crate) fn say(&mut self, sentence: &str) {
         let mut line = String::from("#");
-        for word in sentence.split(' ').map(harmless).filter(|word| !word.is_empty()) {
+        for word in sentence.split(' ').map(escape_controls).filter(|word| !word.is_empty()) {
             if line.len() > 1 && line.chars().count() + 1 + word.chars().count() > WIDTH {
                 self.line(&line);
                 line = String::from("#");
@@ -30,14 +30,14 @@ impl Page {
 
     /// Writes a command as a comment, and what it does.
     pub(crate) fn show(&mut self, command: &str, what: &str) {
-        let command = format!("#   {}", harmless(command));
+        let command = format!("#   {}", escape_controls(command));
         self.line(&format!("{command:<COLUMN$} {what}"));
     }
 
     /// Writes an option that does not count until its # is removed, and what it does.
     pub(crate) fn offer(&mut self, option: &str, what: &str) {
         let option = format!("#{option}");
-        self.line(&format!("{option:<COLUMN$} # {}", harmless(what)));
+        self.line(&format!("{option:<COLUMN$} # {}", escape_controls(what)));
     }
 
     /// Writes a line that counts.
@@ -81,7 +81,7 @@ impl Page {
 
 /// Returns a text without characters that would end a comment, that TOML allows in none, or that a terminal would obey. Names of files
 /// and of systems may have them.
-pub(crate) fn harmless(text: &str) -> String {
+pub(crate) fn escape_controls(text: &str) -> String {
     text.chars().map(|c| if is_obeyed(c) { '\u{fffd}' } else { c }).collect()
 }
 

@@ -13,30 +13,30 @@ const MOST_NAMED: usize = 4;
 /// Why datums are taken for one.
 const WHY_CLOSE: &str = "The datums of the files differ by a metre or two. They are taken for one.";
 
-/// Ways to run a draft that is refused as it is. Each is tried in turn.
-pub(crate) struct Ways {
+/// CrsAttempts to run a draft that is refused as it is. Each is tried in turn.
+pub(crate) struct CrsAttempts {
     draft: Draft,
     sources: Vec<Source>,
-    waiting: std::vec::IntoIter<Way>,
+    waiting: std::vec::IntoIter<CrsAttempt>,
     /// Whether the plane has not been tried yet.
     may_be_plane: bool,
 }
 
 /// A way to bring all points onto one plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
+enum CrsAttempt {
     /// Into a UTM zone; with `close`, datums that are a metre or two apart count as one.
     Utm { close: bool },
     /// The coordinates are none that the records of the files can mean.
     Plane,
 }
 
-impl Ways {
+impl CrsAttempts {
     /// Returns the ways for `draft`. Opens its files, of which each is a point cloud.
     ///
     /// # Errors
     /// Those of opening them.
-    pub(crate) fn of(draft: &Draft) -> Result<Ways> {
+    pub(crate) fn of(draft: &Draft) -> Result<CrsAttempts> {
         let options = draft.options()?;
         let open = |path: &std::path::PathBuf| match points::open(path, &options.input.csv) {
             // What is left out has no say.
@@ -44,9 +44,9 @@ impl Ways {
             opened => opened.map(Some),
         };
         let sources = input_paths(&options.input)?.par_iter().map(open).collect::<Result<Vec<_>>>()?;
-        let ways = vec![Way::Utm { close: false }, Way::Utm { close: true }];
+        let ways = vec![CrsAttempt::Utm { close: false }, CrsAttempt::Utm { close: true }];
         let sources = sources.into_iter().flatten().collect();
-        Ok(Ways { draft: draft.clone(), sources, waiting: ways.into_iter(), may_be_plane: true })
+        Ok(CrsAttempts { draft: draft.clone(), sources, waiting: ways.into_iter(), may_be_plane: true })
     }
 
     /// Returns the draft for the next way.
@@ -69,17 +69,17 @@ impl Ways {
         let all_say_degrees = self.sources.iter().all(|source| source.crs.horizontal == Unit::Degree);
         // Degrees and pixels have no plane in common.
         let is_plane = all_say_degrees && self.sources.iter().all(is_nowhere);
-        (is_plane && std::mem::take(&mut self.may_be_plane)).then(|| self.draft.with(self.lines(Way::Plane)))
+        (is_plane && std::mem::take(&mut self.may_be_plane)).then(|| self.draft.with(self.lines(CrsAttempt::Plane)))
     }
 
-    fn lines(&self, way: Way) -> Vec<NeededLine> {
+    fn lines(&self, way: CrsAttempt) -> Vec<NeededLine> {
         match way {
-            Way::Utm { close } => {
+            CrsAttempt::Utm { close } => {
                 let utm = NeededLine::of_input("to_crs", "utm", &self.why_utm());
                 let close = close.then(|| NeededLine::of_input("datums", "close", WHY_CLOSE));
                 [Some(utm), self.missing_crs(), close].into_iter().flatten().collect()
             }
-            Way::Plane => vec![NeededLine::of_input("crs", "none", &self.why_plane())],
+            CrsAttempt::Plane => vec![NeededLine::of_input("crs", "none", &self.why_plane())],
         }
     }
 

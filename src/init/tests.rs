@@ -132,7 +132,7 @@ fn what_is_needed_stands_there_with_its_reason() {
         "{}",
         new.text
     );
-    let why = new.misfit.unwrap();
+    let why = new.obstacle.unwrap();
     assert!(why.exit_code() == 3 && why.to_string().contains("b.csv: is a Git LFS pointer"), "{why}");
     let decided = new.text.replace("#max_malformed", "max_malformed").replace("#on_bad_file", "on_bad_file");
     check(&config::of_text(&decided, folder.path()).unwrap()).unwrap();

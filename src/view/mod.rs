@@ -4,11 +4,11 @@ mod body;
 pub mod browser;
 mod content;
 mod hosts;
-mod impatient_stream;
 mod response;
 mod results;
 mod server;
 mod site;
+mod timed_stream;
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr, TcpListener};

@@ -12,9 +12,9 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{sleep, timeout};
 
-use crate::view::impatient_stream::ImpatientStream;
 use crate::view::response::response;
 use crate::view::site::Site;
+use crate::view::timed_stream::TimedStream;
 use sys::{Error, Result, interrupt};
 
 /// How long the server may take to see that it was asked to stop.
@@ -58,7 +58,7 @@ impl Server {
                 let Ok(Ok(permit)) = timeout(PATIENCE, Arc::clone(&free).acquire_owned()).await else { continue };
                 match timeout(PATIENCE, listener.accept()).await {
                     Ok(Ok((stream, client))) => {
-                        let stream = ImpatientStream::new(stream, self.stillness);
+                        let stream = TimedStream::new(stream, self.stillness);
                         tokio::spawn(converse(stream, client, Arc::clone(&self.site), permit));
                     }
                     // The client is gone again, or the process has too many files open: that passes.
@@ -72,7 +72,7 @@ impl Server {
 }
 
 /// Answers the requests that come over one connection.
-async fn converse(stream: ImpatientStream, client: SocketAddr, site: Arc<Site>, permit: OwnedSemaphorePermit) {
+async fn converse(stream: TimedStream, client: SocketAddr, site: Arc<Site>, permit: OwnedSemaphorePermit) {
     let answer = service_fn(|request| {
         let response = response(&site, &request, client.ip().is_loopback());
         async { Ok::<_, Infallible>(response) }

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use gdt_batch::Result;
-use gdt_batch::geometry::REACH;
-use gdt_batch::geometry::lattice::{AxisMap, Lattice};
-use gdt_batch::input::{KeptReturns, OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
+use delaunay::geometry::REACH;
+use lattice::{AxisMap, Lattice};
+use points::{KeptReturns, OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
+use sys::Result;
 
 /// A file, all its points, and the lattice on which they lie.
 pub(crate) struct Cloud {

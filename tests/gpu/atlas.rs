@@ -5,15 +5,17 @@ use super::flips::stuck_after_flips;
 use super::linked::LinkedMesh;
 use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::geometry::{REACH, Site};
-use gdt_batch::gpu::atlas::{Atlas, AtlasLeaf};
-use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::leaf_flags::ISLANDS_LEFT;
-use gdt_batch::gpu::options::VoronoiMethod;
-use gdt_batch::gpu::recording::{GpuCommand, Recording};
-use gdt_batch::gpu::texture_size::TextureSize;
-use gdt_batch::gpu::twins::{self, atlas::WrittenSites, c4_flip::AT_INFINITY};
-use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
+use delaunay::geometry::{REACH, Site};
+use delaunay::voronoi::texture_request::{TextureRequest, TextureResolution};
+use delaunay_gpu::atlas::{Atlas, AtlasLeaf};
+use delaunay_gpu::buffer_id::BufferId;
+use delaunay_gpu::leaf_flags::ISLANDS_LEFT;
+use delaunay_gpu::options::VoronoiMethod;
+use delaunay_gpu::recording::{GpuCommand, Recording};
+use delaunay_gpu::reference_kernels;
+use delaunay_gpu::reference_kernels::atlas::WrittenSites;
+use delaunay_gpu::reference_kernels::c4_flip::AT_INFINITY;
+use delaunay_gpu::texture_size::TextureSize;
 use std::collections::BTreeSet;
 
 /// An atlas, and the sites of its vertices.
@@ -94,7 +96,7 @@ fn every_step_on_an_atlas_is_the_same_bit_for_bit() {
     let clouds = all_clouds();
     for pixels_per_site in [5.0, 16.0] {
         let Filled { atlas, sites } = Filled::new(&clouds, pixels_per_site);
-        let written = twins::atlas::write_sites(&atlas, &sites);
+        let written = reference_kernels::atlas::write_sites(&atlas, &sites);
         for method in [VoronoiMethod::Exact, VoronoiMethod::Jfa] {
             let mut recording = Recording::default();
             recording.upload_atlas(&atlas, &sites);
@@ -103,13 +105,13 @@ fn every_step_on_an_atlas_is_the_same_bit_for_bit() {
             rig.run(&recording);
             assert_same("texture", &rig.numbers(BufferId::Texture, written.texture.len() as u64), &written.texture);
             assert_same("missing", &rig.numbers(BufferId::Missing, written.missing.len() as u64), &written.missing);
-            let mut labels = twins::atlas::voronoi(&atlas, &written.texture, method);
+            let mut labels = reference_kernels::atlas::voronoi(&atlas, &written.texture, method);
             assert_same("labels", &rig.numbers(BufferId::Labels, labels.len() as u64), &labels);
 
             let mut islands = Recording::default();
             islands.remove_atlas_islands(&atlas);
             rig.run(&islands);
-            let flags = twins::atlas::remove_islands(&atlas, &mut labels);
+            let flags = reference_kernels::atlas::remove_islands(&atlas, &mut labels);
             assert_same("islands", &rig.numbers(BufferId::Labels, labels.len() as u64), &labels);
             assert_same("flags", &rig.numbers(BufferId::Flags, flags.len() as u64), &flags);
             let flagged: Vec<_> =
@@ -125,7 +127,7 @@ fn losers_move_by_one_pixel_and_keep_the_order_of_x() {
     let clouds = all_clouds();
     for pixels_per_site in [5.0, 16.0] {
         let filled = Filled::new(&clouds, pixels_per_site);
-        let WrittenSites { texture, missing } = twins::atlas::write_sites(&filled.atlas, &filled.sites);
+        let WrittenSites { texture, missing } = reference_kernels::atlas::write_sites(&filled.atlas, &filled.sites);
         let mut moved = 0;
         for leaf in &filled.atlas.leaves {
             let placed = filled.placed(leaf, &texture);
@@ -157,7 +159,7 @@ fn exceptions(cloud: &Cloud, pixels_per_site: f64) -> [[f64; 3]; 2] {
     let one = [Cloud { name: cloud.name, sites: cloud.sites.clone() }];
     let filled = Filled::new(&one, pixels_per_site);
     let leaf = &filled.atlas.leaves[0];
-    let written = twins::atlas::write_sites(&filled.atlas, &filled.sites);
+    let written = reference_kernels::atlas::write_sites(&filled.atlas, &filled.sites);
     let placed = filled.placed(leaf, &written.texture);
     let taken = placed.iter().zip(&cloud.sites).filter_map(|(place, &site)| place.map(|[x, y]| ([y, x], site)));
     let size = TextureSize { width: leaf.width, height: leaf.height };
@@ -200,8 +202,8 @@ impl Patched {
         let clouds: [BTreeSet<Site>; 4] = [uniform(), uniform(), uniform(), uniform()];
         let clouds = clouds.map(|sites| Cloud { name: "uniform", sites: sites.into_iter().collect() });
         let filled = Filled::new(&clouds, 10.0);
-        let written = twins::atlas::write_sites(&filled.atlas, &filled.sites);
-        let clean = twins::atlas::voronoi(&filled.atlas, &written.texture, VoronoiMethod::Exact);
+        let written = reference_kernels::atlas::write_sites(&filled.atlas, &filled.sites);
+        let clean = reference_kernels::atlas::voronoi(&filled.atlas, &written.texture, VoronoiMethod::Exact);
         let mut labels = clean.clone();
         for _ in 0..patches {
             let leaf = &filled.atlas.leaves[1 + random.below(3) as usize];
@@ -234,7 +236,7 @@ fn islands_anywhere_are_removed_as_by_the_twin() {
         let patched = Patched::new(patches, side);
         rig.run(&patched.recording());
         let mut labels = patched.labels.clone();
-        let flags = twins::atlas::remove_islands(&patched.filled.atlas, &mut labels);
+        let flags = reference_kernels::atlas::remove_islands(&patched.filled.atlas, &mut labels);
         assert!(labels != patched.labels && flags[0] == 0);
         assert_eq!(flags.contains(&ISLANDS_LEFT), are_left, "{patches} patches: {flags:?}");
         assert_same("islands", &rig.numbers(BufferId::Labels, labels.len() as u64), &labels);
@@ -261,9 +263,9 @@ fn the_leaves_find_every_error_in_g1_and_g2() {
     let mut clouds = small_clouds();
     clouds.extend(super::clouds::clouds().into_iter().filter(|cloud| ["coarse", "gaussian"].contains(&cloud.name)));
     let Filled { atlas, sites } = Filled::new(&clouds, 5.0);
-    let written = twins::atlas::write_sites(&atlas, &sites);
+    let written = reference_kernels::atlas::write_sites(&atlas, &sites);
     let [exact, jfa] = [VoronoiMethod::Exact, VoronoiMethod::Jfa]
-        .map(|method| twins::atlas::voronoi(&atlas, &written.texture, method));
+        .map(|method| reference_kernels::atlas::voronoi(&atlas, &written.texture, method));
     for (method, right, wrong) in [
         (VoronoiMethod::Exact, "&& sites[i].x != AT_INFINITY", ""),
         (VoronoiMethod::Exact, ".first_site <= site", ".first_site < site"),
@@ -305,7 +307,7 @@ fn the_patches_find_every_error_in_g3() {
     let Some(mut rig) = Rig::new() else { return };
     let patched = Patched::new(3000, 4);
     let mut labels = patched.labels.clone();
-    let flags = twins::atlas::remove_islands(&patched.filled.atlas, &mut labels);
+    let flags = reference_kernels::atlas::remove_islands(&patched.filled.atlas, &mut labels);
     for (right, wrong) in [
         ("word | (word << 1u)", "word"),
         (" | (word >> 1u)", ""),

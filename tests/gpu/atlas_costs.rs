@@ -4,12 +4,12 @@ use super::atlas_mesh::{assert_whole, compare};
 use super::clouds::{clouds, real_cloud};
 use super::placed::{PlacedAtlas, recorded};
 use super::rig::Rig;
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
-use gdt_batch::gpu::recording::{GpuCommand, Recording};
-use gdt_batch::gpu::returned::{ReturnedAtlas, ReturnedLayout};
-use gdt_batch::gpu::twins::atlas::make_triangles;
-use gdt_batch::gpu::twins::c4_flip::{FlipState, flip_round};
+use delaunay::geometry::Site;
+use delaunay_gpu::mesh_steps::FLIP_ROUNDS;
+use delaunay_gpu::recording::{GpuCommand, Recording};
+use delaunay_gpu::reference_kernels::atlas::make_triangles;
+use delaunay_gpu::reference_kernels::c4_flip::{FlipState, flip_round};
+use delaunay_gpu::returned::{ReturnedAtlas, ReturnedLayout};
 
 /// What the device leaves of a real cloud is rare.
 #[test]

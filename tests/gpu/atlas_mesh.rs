@@ -5,15 +5,15 @@ use super::flips::Flipped;
 use super::placed::{PlacedAtlas, recorded};
 use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::leaf_flags::{LONG_EDGE, TOO_MANY_TRIANGLES};
-use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
-use gdt_batch::gpu::recording::{GpuCommand, Recording};
-use gdt_batch::gpu::returned::ReturnedAtlas;
-use gdt_batch::gpu::twins::atlas::{MeshOnDevice, count, find_vertices, give_back, make_triangles};
-use gdt_batch::gpu::twins::c4_flip::{FlipState, flip_round};
-use gdt_batch::voronoi::texture_request::TextureResolution;
+use delaunay::geometry::Site;
+use delaunay::voronoi::texture_request::TextureResolution;
+use delaunay_gpu::buffer_id::BufferId;
+use delaunay_gpu::leaf_flags::{LONG_EDGE, TOO_MANY_TRIANGLES};
+use delaunay_gpu::mesh_steps::FLIP_ROUNDS;
+use delaunay_gpu::recording::{GpuCommand, Recording};
+use delaunay_gpu::reference_kernels::atlas::{MeshOnDevice, count, find_vertices, give_back, make_triangles};
+use delaunay_gpu::reference_kernels::c4_flip::{FlipState, flip_round};
+use delaunay_gpu::returned::ReturnedAtlas;
 use std::collections::BTreeSet;
 
 const FREE: u32 = u32::MAX;
@@ -125,7 +125,7 @@ fn assert_starts_are_near(placed: &PlacedAtlas, leaf: usize, records: &[u32], st
 /// Leaves of few sites, thin leaves and lattices whose textures just fill their blocks, or just do not.
 fn small_leaves() -> Vec<Vec<Site>> {
     let mut random = Random(17);
-    let far = gdt_batch::geometry::REACH;
+    let far = delaunay::geometry::REACH;
     let mut leaves = vec![
         vec![[0, 0], [5, 5], [9, 0]],
         vec![[3, 3], [4, 3], [3, 4]],
@@ -304,7 +304,7 @@ fn the_small_leaves_find_every_error_in_the_shaders() {
 /// Leaves of the same sites, near and far: what the rounds of flips do to one has nothing to do with the others.
 #[test]
 fn flips_stay_within_their_leaf() {
-    let far = gdt_batch::geometry::REACH;
+    let far = delaunay::geometry::REACH;
     let cloud = clouds().into_iter().find(|cloud| cloud.name == "coarse").expect("there is such a cloud");
     let near: Vec<Site> = cloud.sites[..3000].to_vec();
     let moved = |by: i32| near.iter().map(|&[x, y]| [x - by, y + by - (1 << 21)]).collect::<Vec<_>>();

@@ -2,7 +2,7 @@
 
 use super::common::shared;
 use super::random::Random;
-use gdt_batch::geometry::Site;
+use delaunay::geometry::Site;
 use std::collections::BTreeSet;
 
 pub(crate) struct Cloud {

@@ -3,13 +3,13 @@
 use super::clouds::{clouds, hard_clouds, real_cloud};
 use super::instant::Answer;
 use super::random::Random;
-use gdt_batch::geometry::REACH;
-use gdt_batch::geometry::Site;
-use gdt_batch::mesh::half_edge::HalfEdgeMesh;
-use gdt_batch::mesh::index::HalfEdgeIndex;
-use gdt_batch::triangulation::canonical;
-use gdt_batch::voronoi::PipelineBuffers;
-use gdt_batch::voronoi::rejection::Rejection;
+use delaunay::geometry::REACH;
+use delaunay::geometry::Site;
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::mesh::index::HalfEdgeIndex;
+use delaunay::triangulation::canonical;
+use delaunay::voronoi::PipelineBuffers;
+use delaunay::voronoi::rejection::Rejection;
 use std::collections::{BTreeSet, HashMap};
 
 const UNUSED: u32 = u32::MAX;

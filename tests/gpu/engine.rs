@@ -3,16 +3,16 @@
 use super::clouds::{clouds, real_cloud};
 use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::device::AdapterRequest;
-use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas, MAX_PIXELS};
-use gdt_batch::gpu::landed::Landed;
-use gdt_batch::gpu::mesh_engine::{GpuMeshEngine, MAX_IN_FLIGHT, MeshEngine};
-use gdt_batch::gpu::options::VoronoiMethod;
-use gdt_batch::gpu::recording::{GpuCommand, GpuStep, Recording};
-use gdt_batch::gpu::returned::ReturnedAtlas;
-use gdt_batch::gpu::twins;
-use gdt_batch::voronoi::texture_request::TextureResolution;
+use delaunay::geometry::Site;
+use delaunay::voronoi::texture_request::TextureResolution;
+use delaunay_gpu::device::AdapterRequest;
+use delaunay_gpu::filled_atlas::{AtlasLimits, FilledAtlas, MAX_PIXELS};
+use delaunay_gpu::landed::Landed;
+use delaunay_gpu::mesh_engine::{GpuMeshEngine, MAX_IN_FLIGHT, MeshEngine};
+use delaunay_gpu::options::VoronoiMethod;
+use delaunay_gpu::recording::{GpuCommand, GpuStep, Recording};
+use delaunay_gpu::reference_kernels;
+use delaunay_gpu::returned::ReturnedAtlas;
 
 /// What comes back may stay in buffers of so many bytes: enough for some atlases of these tests, but not for all.
 const LENT: u64 = 1 << 20;
@@ -54,7 +54,7 @@ fn three_atlases_in_flight_are_those_of_the_twins() {
             let pending: Vec<_> = started.collect::<Result<_, _>>().expect("the steps run");
             for (slot, (atlas, pending)) in atlases.iter().zip(pending).enumerate() {
                 let Landed { numbers: returned, times, .. } = engine.finish(slot, pending).expect("they come back");
-                let expected = twins::atlas::mesh(&atlas.atlas, &atlas.sites, method);
+                let expected = reference_kernels::atlas::mesh(&atlas.atlas, &atlas.sites, method);
                 assert!((*returned).as_ref() == expected, "{method:?}, slot {slot}");
                 assert!(times.iter().all(|&time| time == 0) || times[GpuStep::Flips as usize] > 0, "{times:?}");
             }

@@ -2,10 +2,10 @@
 
 use super::placed::{PlacedAtlas, recorded};
 use super::rig::Rig;
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::error::GpuError;
-use gdt_batch::gpu::recording::{GpuCommand, Recording};
+use delaunay::geometry::Site;
+use delaunay_gpu::buffer_id::BufferId;
+use delaunay_gpu::error::GpuError;
+use delaunay_gpu::recording::{GpuCommand, Recording};
 
 /// An atlas of one triangle.
 fn small() -> PlacedAtlas {

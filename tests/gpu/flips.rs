@@ -4,12 +4,12 @@ use super::clouds::{Cloud, clouds, hard_clouds, real_cloud};
 use super::linked::LinkedMesh;
 use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::geometry::Site;
-use gdt_batch::geometry::predicates::{in_circle, orient2d};
-use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::mesh_steps::FLIP_ROUNDS;
-use gdt_batch::gpu::recording::{GpuCommand, Recording};
-use gdt_batch::gpu::twins::c4_flip::{AT_INFINITY, FlipState, flip_round};
+use delaunay::geometry::Site;
+use delaunay::geometry::predicates::{in_circle, orient2d};
+use delaunay_gpu::buffer_id::BufferId;
+use delaunay_gpu::mesh_steps::FLIP_ROUNDS;
+use delaunay_gpu::recording::{GpuCommand, Recording};
+use delaunay_gpu::reference_kernels::c4_flip::{AT_INFINITY, FlipState, flip_round};
 use std::collections::BTreeSet;
 
 const FREE: u32 = u32::MAX;

@@ -1,17 +1,17 @@
 //! A device that answers at once: its meshes are made in advance, with the twins of the shaders.
 
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::atlas::{Atlas, AtlasLeaf};
-use gdt_batch::gpu::options::VoronoiMethod;
-use gdt_batch::gpu::returned::ReturnedAtlas;
-use gdt_batch::gpu::twins::atlas;
-use gdt_batch::gpu::twins::c4_flip::AT_INFINITY;
-use gdt_batch::mesh::half_edge::HalfEdgeMesh;
-use gdt_batch::voronoi::counts::PipelineCounts;
-use gdt_batch::voronoi::device_mesh::DeviceMesh;
-use gdt_batch::voronoi::rejection::Rejection;
-use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
-use gdt_batch::voronoi::{PipelineBuffers, from_device};
+use delaunay::geometry::Site;
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::voronoi::counts::PipelineCounts;
+use delaunay::voronoi::device_mesh::DeviceMesh;
+use delaunay::voronoi::rejection::Rejection;
+use delaunay::voronoi::texture_request::{TextureRequest, TextureResolution};
+use delaunay::voronoi::{PipelineBuffers, from_device};
+use delaunay_gpu::atlas::{Atlas, AtlasLeaf};
+use delaunay_gpu::options::VoronoiMethod;
+use delaunay_gpu::reference_kernels::atlas;
+use delaunay_gpu::reference_kernels::c4_flip::AT_INFINITY;
+use delaunay_gpu::returned::ReturnedAtlas;
 
 const MAX_PIXELS: u32 = 1 << 24;
 

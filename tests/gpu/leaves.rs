@@ -3,21 +3,23 @@
 use super::clouds::{Cloud, clouds, hard_clouds, real_cloud};
 use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
-use gdt_batch::gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
-use gdt_batch::gpu::returned::replies;
-use gdt_batch::gpu::twins;
-use gdt_batch::job::{self, progress::stage::ProgressOutput};
-use gdt_batch::mesh::half_edge::HalfEdgeMesh;
-use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
-use gdt_batch::triangulation::{TriangulationCounts, Triangulator, canonical};
-use gdt_batch::verify::verify;
-use gdt_batch::voronoi::mesh_reply::{MadeMesh, MeshReply, SharedNumbers};
-use gdt_batch::voronoi::texture_request::TextureResolution;
-use gdt_batch::voronoi::{self, PipelineBuffers};
+use delaunay::geometry::Site;
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::triangulation::{TriangulationCounts, canonical};
+use delaunay::voronoi;
+use delaunay::voronoi::PipelineBuffers;
+use delaunay::voronoi::mesh_reply::{MadeMesh, MeshReply, SharedNumbers};
+use delaunay::voronoi::texture_request::TextureResolution;
+use delaunay_gpu::filled_atlas::{AtlasLimits, FilledAtlas};
+use delaunay_gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
+use delaunay_gpu::reference_kernels;
+use delaunay_gpu::returned::replies;
+use delaunay_gpu::triangulation_options::{Backend, TriangulationOptions};
+use delaunay_gpu::triangulator::Triangulator;
+use job::progress::stage::ProgressOutput;
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use verify::verify;
 
 const MEMORY: u64 = 1 << 30;
 
@@ -112,7 +114,7 @@ fn reply(sites: &[Site]) -> MeshReply {
     let mut filled = FilledAtlas::default();
     let limits = AtlasLimits { pixels: 1 << 24, bytes: 1 << 27 };
     assert!(filled.add(sites, TextureResolution::PixelsPerSite(16.0), limits));
-    let numbers = twins::atlas::mesh(&filled.atlas, &filled.sites, VoronoiMethod::Exact);
+    let numbers = reference_kernels::atlas::mesh(&filled.atlas, &filled.sites, VoronoiMethod::Exact);
     let numbers: SharedNumbers = Arc::new(numbers);
     replies(&filled.atlas, &numbers, true).remove(0)
 }

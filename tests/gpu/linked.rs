@@ -1,11 +1,12 @@
 //! Linked meshes as step G6 makes them, before any flip, for the tests of flips.
 
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::atlas::{Atlas, AtlasLeaf, BLOCK_SIDE};
-use gdt_batch::gpu::options::VoronoiMethod;
-use gdt_batch::gpu::texture_size::TextureSize;
-use gdt_batch::gpu::twins::atlas::{AtlasDiagram, make_triangles};
-use gdt_batch::gpu::twins::{self, c4_flip::AT_INFINITY};
+use delaunay::geometry::Site;
+use delaunay_gpu::atlas::{Atlas, AtlasLeaf, BLOCK_SIDE};
+use delaunay_gpu::options::VoronoiMethod;
+use delaunay_gpu::reference_kernels;
+use delaunay_gpu::reference_kernels::atlas::{AtlasDiagram, make_triangles};
+use delaunay_gpu::reference_kernels::c4_flip::AT_INFINITY;
+use delaunay_gpu::texture_size::TextureSize;
 use std::collections::HashMap;
 
 /// A closed mesh: eight numbers for each triangle, and the site of every vertex. The last vertex is at infinity.
@@ -97,8 +98,8 @@ impl LinkedMesh {
         for (&pixel, i) in placed.pixels.iter().zip(0..) {
             texture[leaf.at(pixel & 0xffff, pixel >> 16) as usize] = !i;
         }
-        let mut labels = twins::atlas::voronoi(&atlas, &texture, VoronoiMethod::Exact);
-        twins::atlas::remove_islands(&atlas, &mut labels);
+        let mut labels = reference_kernels::atlas::voronoi(&atlas, &texture, VoronoiMethod::Exact);
+        reference_kernels::atlas::remove_islands(&atlas, &mut labels);
         let missing = count - placed.sites.len();
         let sites = [placed.sites.as_slice(), &[[AT_INFINITY, 0]]].concat();
         let diagram = AtlasDiagram { atlas: &atlas, labels: &labels, texture: &texture, sites: &sites };

@@ -1,13 +1,14 @@
 //! What step G4 in an atlas starts from, made by the twins of steps G1 to G3.
 
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::atlas::Atlas;
-use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::options::VoronoiMethod;
-use gdt_batch::gpu::recording::{GpuCommand, Recording};
-use gdt_batch::gpu::twins::atlas::AtlasDiagram;
-use gdt_batch::gpu::twins::{self, c4_flip::AT_INFINITY};
-use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
+use delaunay::geometry::Site;
+use delaunay::voronoi::texture_request::{TextureRequest, TextureResolution};
+use delaunay_gpu::atlas::Atlas;
+use delaunay_gpu::buffer_id::BufferId;
+use delaunay_gpu::options::VoronoiMethod;
+use delaunay_gpu::recording::{GpuCommand, Recording};
+use delaunay_gpu::reference_kernels;
+use delaunay_gpu::reference_kernels::atlas::AtlasDiagram;
+use delaunay_gpu::reference_kernels::c4_flip::AT_INFINITY;
 
 const MAX_PIXELS: u32 = 1 << 24;
 
@@ -43,9 +44,9 @@ impl PlacedAtlas {
 
     /// Does steps G1 to G3.
     pub(crate) fn place(&mut self) {
-        let written = twins::atlas::write_sites(&self.atlas, &self.sites);
-        self.labels = twins::atlas::voronoi(&self.atlas, &written.texture, VoronoiMethod::Exact);
-        self.flags = twins::atlas::remove_islands(&self.atlas, &mut self.labels);
+        let written = reference_kernels::atlas::write_sites(&self.atlas, &self.sites);
+        self.labels = reference_kernels::atlas::voronoi(&self.atlas, &written.texture, VoronoiMethod::Exact);
+        self.flags = reference_kernels::atlas::remove_islands(&self.atlas, &mut self.labels);
         (self.texture, self.missing) = (written.texture, written.missing);
     }
 
@@ -59,7 +60,8 @@ impl PlacedAtlas {
         let mut recording = Recording::default();
         recording.upload_atlas(&self.atlas, &self.sites);
         // Labels outside the textures must not matter.
-        let labels = self.labels.iter().map(|&label| if label == twins::NONE { 0 } else { label }).collect();
+        let labels =
+            self.labels.iter().map(|&label| if label == reference_kernels::NONE { 0 } else { label }).collect();
         for (id, numbers) in [
             (BufferId::Labels, labels),
             (BufferId::Texture, self.texture.clone()),

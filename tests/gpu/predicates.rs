@@ -2,12 +2,12 @@
 
 use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::geometry::REACH;
-use gdt_batch::geometry::Site;
-use gdt_batch::geometry::predicates::{in_circle, in_circle_determinant, orient2d};
-use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::recording::{GpuCommand, Recording};
-use gdt_batch::gpu::twins::predicates::decide;
+use delaunay::geometry::REACH;
+use delaunay::geometry::Site;
+use delaunay::geometry::predicates::{in_circle, in_circle_determinant, orient2d};
+use delaunay_gpu::buffer_id::BufferId;
+use delaunay_gpu::recording::{GpuCommand, Recording};
+use delaunay_gpu::reference_kernels::predicates::decide;
 
 const QUADS: usize = 1_000_000;
 

@@ -1,6 +1,6 @@
 //! Random numbers for the tests.
 
-use gdt_batch::gpu::texture_size::TextureSize;
+use delaunay_gpu::texture_size::TextureSize;
 
 /// A small generator (xorshift64*), so that cases are the same on every machine.
 pub(crate) struct Random(pub(crate) u64);

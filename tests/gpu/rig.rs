@@ -1,13 +1,14 @@
 //! An engine on the first suitable adapter, and how to get numbers back from it.
 
-use gdt_batch::gpu::buffer_id::BufferId;
-use gdt_batch::gpu::buffers::BufferSet;
-use gdt_batch::gpu::device::{self, AdapterRequest, Device};
-use gdt_batch::gpu::engine::GpuEngine;
-use gdt_batch::gpu::error::GpuError;
-use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
-use gdt_batch::gpu::recording::Recording;
-use gdt_batch::gpu::selftest::{StepComparison, compare};
+use delaunay_gpu::buffer_id::BufferId;
+use delaunay_gpu::buffers::BufferSet;
+use delaunay_gpu::device;
+use delaunay_gpu::device::{AdapterRequest, Device};
+use delaunay_gpu::engine::GpuEngine;
+use delaunay_gpu::error::GpuError;
+use delaunay_gpu::filled_atlas::{AtlasLimits, FilledAtlas};
+use delaunay_gpu::recording::Recording;
+use delaunay_gpu::selftest::{StepComparison, compare};
 
 pub(crate) struct Rig {
     engine: GpuEngine,

@@ -3,10 +3,10 @@
 use super::clouds::clouds;
 use super::random::Random;
 use super::rig::Rig;
-use gdt_batch::gpu::filled_atlas::{AtlasLimits, FilledAtlas};
-use gdt_batch::gpu::texture_size::TextureSize;
-use gdt_batch::gpu::twins;
-use gdt_batch::voronoi::texture_request::TextureResolution;
+use delaunay::voronoi::texture_request::TextureResolution;
+use delaunay_gpu::filled_atlas::{AtlasLimits, FilledAtlas};
+use delaunay_gpu::reference_kernels;
+use delaunay_gpu::texture_size::TextureSize;
 
 #[test]
 fn the_self_test_compares_every_step() {
@@ -45,8 +45,9 @@ fn the_twins_compute_nearest_sites() {
         };
         let expected: Vec<u32> =
             (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| nearest(x, y)).collect();
-        assert_eq!(twins::voronoi_exact(size, &texture), expected);
-        let wrong = twins::voronoi_jfa(size, &texture).iter().zip(&expected).filter(|(a, b)| a != b).count();
+        assert_eq!(reference_kernels::voronoi_exact(size, &texture), expected);
+        let wrong =
+            reference_kernels::voronoi_jfa(size, &texture).iter().zip(&expected).filter(|(a, b)| a != b).count();
         assert!(50 * wrong <= expected.len(), "1+JFA misses {wrong} of {} pixels", expected.len());
     }
 }

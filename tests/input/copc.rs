@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use gdt_batch::Result;
-use gdt_batch::input::{Point, PointCounts, PointRules, RowChoice, Source, TextOptions, open_chosen};
+use points::{Point, PointCounts, PointRules, RowChoice, Source, TextOptions, open_chosen};
 use proptest::prelude::*;
+use sys::Result;
 
 use crate::cloud::{decode, file, lattice, rules};
 use crate::common;

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use gdt_batch::Error;
-use gdt_batch::input::{Point, TextOptions, open};
+use points::{Point, TextOptions, open};
 use proptest::prelude::*;
+use sys::Error;
 
 use crate::cloud::{file, lattice, read_bytes, rules, survives};
 use crate::las_file::{LasFile, points_at};

@@ -1,6 +1,6 @@
 //! Made-up files of every point format, uncompressed and compressed.
 
-use gdt_batch::input::{TextOptions, open};
+use points::{TextOptions, open};
 
 use crate::cloud::{file, read_bytes};
 use crate::las_file::{LasFile, points_at};
@@ -77,7 +77,7 @@ fn the_position_of_the_table_may_be_stored_at_the_end() {
 #[test]
 fn a_description_says_what_a_file_holds() {
     let path = file(".laz", &LasFile::new(4, 7, 0, 100).laz(&[40], false));
-    let description = gdt_batch::input::info::describe(&open(&path, &TextOptions::default()).unwrap());
+    let description = points::info::describe(&open(&path, &TextOptions::default()).unwrap());
     let json = serde_json::to_value(&description).unwrap();
     assert_eq!(
         (json["points"].as_u64(), json["version"].as_str(), json["format"].as_str()),

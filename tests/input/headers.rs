@@ -1,7 +1,7 @@
 //! Headers with wrong, odd and extreme fields.
 
-use gdt_batch::geometry::lattice::AxisMap;
-use gdt_batch::input::{KeptReturns, OptionalFields, PointRules, TextOptions, open};
+use lattice::AxisMap;
+use points::{KeptReturns, OptionalFields, PointRules, TextOptions, open};
 
 use crate::cloud::{decode, file, read_bytes};
 use crate::las_file::LasFile;

@@ -1,7 +1,7 @@
 //! The layouts of texts that programs write: names of columns, lines before them, delimiters, colours.
 
-use gdt_batch::Result;
-use gdt_batch::input::{Point, TextOptions, Unit, open};
+use points::{Point, TextOptions, Unit, open};
+use sys::Result;
 
 use crate::cloud::{Cloud, file, read_bytes};
 use crate::first_warning;

@@ -23,8 +23,8 @@ mod starts;
 mod written_down;
 
 use cloud::{Cloud, read_bytes, rules};
-use gdt_batch::input::Point;
 use las_file::LasFile;
+use points::Point;
 
 /// Returns the first warning about the file; empty if there is none.
 pub(crate) fn first_warning(cloud: &Cloud) -> &str {

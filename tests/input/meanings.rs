@@ -1,6 +1,6 @@
 //! Texts that look like something else: decimal commas, directions and units in brackets, degrees, colours, apostrophes.
 
-use gdt_batch::input::{TextOptions, Unit, open};
+use points::{TextOptions, Unit, open};
 
 use crate::cloud::file;
 use crate::first_warning;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gdt_batch::input::{Point, PointCounts, TextOptions, Unit, open};
+use points::{Point, PointCounts, TextOptions, Unit, open};
 use rayon::prelude::*;
 
 use crate::cloud::{Cloud, lattice, read, rules};

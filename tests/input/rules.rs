@@ -1,9 +1,9 @@
 //! The rules of a job: which points are kept, and where they land on the lattice.
 
-use gdt_batch::Error;
-use gdt_batch::geometry::REACH;
-use gdt_batch::geometry::lattice::Lattice;
-use gdt_batch::input::{OptionalFields, Point, RawBounds, TextOptions, open};
+use delaunay::geometry::REACH;
+use lattice::Lattice;
+use points::{OptionalFields, Point, RawBounds, TextOptions, open};
+use sys::Error;
 
 use crate::cloud::{decode, file, lattice, rules};
 use crate::las_file::LasFile;

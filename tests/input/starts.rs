@@ -1,6 +1,6 @@
 //! The start of a chunk is decoded as the whole chunk is.
 
-use gdt_batch::input::{Point, TextOptions, open};
+use points::{Point, TextOptions, open};
 
 use crate::cloud::{file, lattice, rules};
 use crate::las_file::LasFile;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gdt_batch::input::{KeptReturns, PointRules, RawBounds, Source, TextOptions, open};
+use points::{KeptReturns, PointRules, RawBounds, Source, TextOptions, open};
 use rayon::prelude::*;
 
 use crate::cloud::{decode, file, lattice, rules};

@@ -305,7 +305,7 @@ fn a_cure_brings_one_of_several_files_to_the_others() {
         job("").run().refused(3, &words);
         job("").run_with(&["check"]).refused(3, &words);
     }
-    // Alone, x and y may be exchanged.
+    // SingleProcess, x and y may be exchanged.
     let alone = csv(&folder, "alone.csv", [45_050.0, 450_010.0], 0.7);
     let said = Job::on(&[&alone]).with("input", "crs = \"EPSG:32633\"").run();
     assert!((said.out + &said.err).contains("With x and y exchanged"), "{}", said.err);

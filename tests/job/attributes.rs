@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use gdt_batch::output::gltf::read::{TileFile, TilePart, read_tile};
-use gdt_batch::verify::SourceGrid;
 use serde_json::{Value, json};
+use tiles::gltf::read::{TileFile, TilePart, read_tile};
+use verify::SourceGrid;
 
 use crate::clouds;
 use crate::common::shared;

@@ -4,15 +4,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use gdt_batch::Error;
-use gdt_batch::input::options::OnBadFile;
-use gdt_batch::job::durable::directory::JobDirectory;
-use gdt_batch::job::partition::read::read_points;
-use gdt_batch::job::plan::job_plan::Plan;
-use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
-use gdt_batch::job::plan::make_plan::make_plan;
-use gdt_batch::job::progress::stage::ProgressOutput;
+use job::durable::directory::JobDirectory;
+use job::partition::read::read_points;
+use job::plan::job_plan::Plan;
+use job::plan::lattice_choice::LatticeCoarsening;
+use job::plan::make_plan::make_plan;
+use job::progress::stage::ProgressOutput;
+use points::options::OnBadFile;
 use serde_json::Value;
+use sys::Error;
 
 use crate::las_file::{LasFile, points_at};
 use crate::program::{Job, Said, number};

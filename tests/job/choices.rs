@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use gdt_batch::output::gltf::read::{TileFile, read_tile};
-use gdt_batch::verify::SourceGrid;
 use serde_json::Value;
 use tempfile::TempDir;
+use tiles::gltf::read::{TileFile, read_tile};
+use verify::SourceGrid;
 
 use crate::program::{Job, number};
 

@@ -10,9 +10,9 @@ use crate::levels::{bits, greatest_error, outline};
 use crate::program::Job;
 use crate::random::Random;
 use crate::tileset::{Tile, applied, height, keeps_the_rules, numbers, tiles, triangles};
-use gdt_batch::output::frame::Extras;
-use gdt_batch::output::gltf::read::{TilePart, read_extras, read_tile};
-use gdt_batch::verify::SourceGrid;
+use tiles::frame::Extras;
+use tiles::gltf::read::{TilePart, read_extras, read_tile};
+use verify::SourceGrid;
 
 /// Source coordinates of the middle of the area.
 const MIDDLE: [f64; 3] = [500_000.0, 4_000_000.0, 0.0];

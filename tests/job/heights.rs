@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use gdt_batch::job::plan::job_plan::Plan;
-use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
-use gdt_batch::job::plan::make_plan::make_plan;
-use gdt_batch::output::color::{HeightRange, height_color};
-use gdt_batch::output::gltf::read::read_tile;
-use gdt_batch::verify::SourceGrid;
+use job::plan::job_plan::Plan;
+use job::plan::lattice_choice::LatticeCoarsening;
+use job::plan::make_plan::make_plan;
+use tiles::color::{HeightRange, height_color};
+use tiles::gltf::read::read_tile;
+use verify::SourceGrid;
 
 use crate::clouds::{self, Cloud};
 use crate::las_file::LasFile;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
-use gdt_batch::output::gltf::read::read_tile;
 use serde_json::Value;
+use tiles::gltf::read::read_tile;
 
 use crate::clouds::{self, Cloud};
 use crate::parts::{in_files, in_parts};

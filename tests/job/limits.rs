@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use gdt_batch::job::progress::stage::ProgressOutput;
+use job::progress::stage::ProgressOutput;
 
 use crate::clouds;
 use crate::program::{Job, Said, gdt_batch, number};
@@ -116,14 +116,14 @@ fn one_raise_of_the_memory_suffices_for_points_that_no_tile_can_decide() {
     let mut options = gdt_batch::config::load(&job.config()).unwrap();
     // Less than a configuration may say, so that few points are too many.
     options.limits.memory.0 = 11 << 20;
-    let error = gdt_batch::job::run(&options, ProgressOutput::Quiet).unwrap_err();
+    let error = job::run(&options, ProgressOutput::Quiet).unwrap_err();
     assert_eq!(error.exit_code(), 1);
     let said = error.to_string();
     assert!(said.contains("no tile can decide") && said.contains("finished steps are kept"), "{said}");
     let (_, after) = said.split_once("set memory = \"").unwrap();
     let mebibytes: u64 = after.split_once(" MiB").unwrap().0.parse().unwrap();
     options.limits.memory.0 = mebibytes << 20;
-    let report = gdt_batch::job::run(&options, ProgressOutput::Quiet).unwrap();
+    let report = job::run(&options, ProgressOutput::Quiet).unwrap();
     assert!(report.resumed > 10, "the leaves of the first run are kept: {}", report.resumed);
     job.verified();
 }

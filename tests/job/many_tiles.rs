@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use gdt_batch::verify::{Conclusion, verify};
 use serde_json::Value;
+use verify::{Conclusion, verify};
 
 use crate::clouds;
 use crate::levels::hills;

@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use gdt_batch::job::preflight::check::{self, Preflight};
+use job::preflight::check;
+use job::preflight::check::Preflight;
 
 use crate::clouds;
 use crate::las_file::{LasFile, points_at};

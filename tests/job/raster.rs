@@ -5,10 +5,10 @@ use std::fs::{self, File};
 use std::io::{BufReader, Cursor};
 use std::path::{Path, PathBuf};
 
-use gdt_batch::output::gltf::read::read_tile;
 use serde_json::Value;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
+use tiles::gltf::read::read_tile;
 
 use crate::clouds::{self, Cloud};
 use crate::coordinate_systems::{keys, warnings, write};

@@ -1,24 +1,25 @@
 //! Runs the steps of a job by hand, on many small clouds cut into tiny tiles. The final triangles of all nodes together are the
 //! triangulation of all sites at once.
 
-use gdt_batch::geometry::Site;
-use gdt_batch::job::durable::atomic_file::publish;
-use gdt_batch::job::durable::directory::JobDirectory;
-use gdt_batch::job::index::NodeIndex;
-use gdt_batch::job::merge_records::Seam;
-use gdt_batch::job::mesh::leaf::triangulate_leaf;
-use gdt_batch::job::mesh::merge::merge_frontiers;
-use gdt_batch::job::options::JobOptions;
-use gdt_batch::job::partition::point_file::PointFiles;
-use gdt_batch::job::partition::read::read_points;
-use gdt_batch::job::partition::result::Partition;
-use gdt_batch::job::plan::job_plan::Plan;
-use gdt_batch::job::plan::lattice_choice::LatticeCoarsening;
-use gdt_batch::job::plan::make_plan::make_plan;
-use gdt_batch::job::progress::stage::ProgressOutput;
-use gdt_batch::job::records::{Leaf, Store};
-use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
-use gdt_batch::triangulation::{Triangulator, reference};
+use delaunay::geometry::Site;
+use delaunay::triangulation::reference;
+use delaunay_gpu::triangulation_options::{Backend, TriangulationOptions};
+use delaunay_gpu::triangulator::Triangulator;
+use job::durable::atomic_file::publish;
+use job::durable::directory::JobDirectory;
+use job::index::NodeIndex;
+use job::merge_records::Seam;
+use job::mesh::leaf::triangulate_leaf;
+use job::mesh::merge::merge_frontiers;
+use job::options::JobOptions;
+use job::partition::point_file::PointFiles;
+use job::partition::read::read_points;
+use job::partition::result::Partition;
+use job::plan::job_plan::Plan;
+use job::plan::lattice_choice::LatticeCoarsening;
+use job::plan::make_plan::make_plan;
+use job::progress::stage::ProgressOutput;
+use job::records::{Leaf, Store};
 
 use crate::clouds::{self, Cloud};
 use crate::program::Job;
@@ -55,7 +56,7 @@ fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
     let store = Store::create(directory.store()).unwrap();
     let points = PointFiles::open(&directory.point_files().unwrap()).unwrap();
     let cpu = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
-    let triangulator = Triangulator::new(&cpu, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28).unwrap();
+    let triangulator = Triangulator::new(&cpu, &delaunay_gpu::options::GpuOptions::default(), 1 << 28).unwrap();
     let tree = &partition.tree;
     for tile in tree.tiles().rev() {
         triangulate_leaf(&plan, &partition, &points, &store, &triangulator, tile).unwrap();

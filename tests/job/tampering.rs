@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use gdt_batch::output::checksums::{Checksum, list_text, parse_list, seal};
-use gdt_batch::verify::{Conclusion, Verdict, verify, verify_against};
 use serde_json::Value;
 use tempfile::TempDir;
+use tiles::checksums::{Checksum, list_text, parse_list, seal};
+use verify::{Conclusion, Verdict, verify, verify_against};
 
 use crate::clouds;
 use crate::program::{Job, gdt_batch};

@@ -7,12 +7,12 @@ use crate::levels::hills;
 use crate::parts::{in_files, in_parts};
 use crate::program::{Job, Said, gdt_batch, number};
 use crate::tileset::tiles;
-use gdt_batch::output::checksums::seal;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, SystemTime};
+use tiles::checksums::seal;
 
 const PHASES: [&str; 7] = ["plan", "read", "mesh", "join", "tiles", "levels", "publish"];
 

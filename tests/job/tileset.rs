@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use gdt_batch::output::gltf::read::read_tile;
 use serde_json::Value;
+use tiles::gltf::read::read_tile;
 
 use crate::program::Job;
 

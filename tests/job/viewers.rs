@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use gdt_batch::output::tiles3d::globe::relative_transform;
 use serde_json::{Value, json};
+use tiles::tiles3d::globe::relative_transform;
 
 use crate::clouds;
 use crate::common::shared;

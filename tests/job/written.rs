@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use gdt_batch::output::preview::canvas::LONGER_SIDE;
-use gdt_batch::verify::verify;
 use serde_json::Value;
+use tiles::preview::canvas::LONGER_SIDE;
+use verify::verify;
 
 use crate::clouds;
 use crate::program::{Job, number};

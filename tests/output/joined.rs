@@ -1,8 +1,8 @@
 //! Tests of `terrain.glb`, the scene of all tiles.
 
-use gdt_batch::output::Compression;
-use gdt_batch::output::gltf::one_file::write_terrain;
-use gdt_batch::output::gltf::read::read_tile;
+use tiles::Compression;
+use tiles::gltf::one_file::write_terrain;
+use tiles::gltf::read::read_tile;
 
 use crate::model::{attributed, cloud, cut_by_place, terrain, utm, write_tiles, write_tiles_as};
 

@@ -1,8 +1,8 @@
 //! The Khronos validator finds nothing wrong with the files.
 
-use gdt_batch::output::frame::Frame;
-use gdt_batch::output::gltf::one_file::write_terrain;
-use gdt_batch::output::{Compression, Tile};
+use tiles::frame::Frame;
+use tiles::gltf::one_file::write_terrain;
+use tiles::{Compression, Tile};
 
 use crate::model::{attributed, cloud, cut_by_place, grid, lattice, terrain, utm, write_tiles, write_tiles_as};
 use crate::validator::validate;

@@ -3,15 +3,15 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use gdt_batch::geometry::Bounds;
-use gdt_batch::geometry::lattice::{Lattice, shortest_decimal};
-use gdt_batch::geometry::predicates::{in_circle, orient2d};
-use gdt_batch::output::attributes::PointAttributes;
-use gdt_batch::output::frame::Frame;
-use gdt_batch::output::gltf::glb::GlbEncoder;
-use gdt_batch::output::normals::NormalSums;
-use gdt_batch::output::{Compression, Tile};
+use delaunay::geometry::Bounds;
+use delaunay::geometry::predicates::{in_circle, orient2d};
+use lattice::{Lattice, shortest_decimal};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
+use tiles::attributes::PointAttributes;
+use tiles::frame::Frame;
+use tiles::gltf::glb::GlbEncoder;
+use tiles::normals::NormalSums;
+use tiles::{Compression, Tile};
 
 use crate::random::Random;
 
@@ -174,7 +174,7 @@ pub(crate) fn write_tiles_as(compression: Compression, directory: &Path, frame: 
 }
 
 /// Returns the bytes of the GLB file of `tile`.
-pub(crate) fn encode_tile(frame: &Frame, tile: &Tile, compression: Compression) -> gdt_batch::Result<Vec<u8>> {
+pub(crate) fn encode_tile(frame: &Frame, tile: &Tile, compression: Compression) -> sys::Result<Vec<u8>> {
     let mut glb = GlbEncoder::default();
     glb.encode(frame, tile, compression, None)?;
     Ok(glb.pieces().concat())

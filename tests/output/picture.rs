@@ -1,14 +1,14 @@
 //! Tests of the preview.
 
-use gdt_batch::geometry::predicates::orient2d;
-use gdt_batch::output::Tile;
-use gdt_batch::output::color::HeightRange;
-use gdt_batch::output::frame::Frame;
-use gdt_batch::output::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
-use gdt_batch::output::preview::layout::world_file;
-use gdt_batch::output::preview::panel::Legend;
-use gdt_batch::output::preview::picture::Picture;
+use delaunay::geometry::predicates::orient2d;
 use proptest::prelude::*;
+use tiles::Tile;
+use tiles::color::HeightRange;
+use tiles::frame::Frame;
+use tiles::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
+use tiles::preview::layout::world_file;
+use tiles::preview::panel::Legend;
+use tiles::preview::picture::Picture;
 
 use std::collections::BTreeSet;
 

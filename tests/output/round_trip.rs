@@ -2,15 +2,15 @@
 
 use std::collections::HashMap;
 
-use gdt_batch::Error;
-use gdt_batch::geometry::Bounds;
-use gdt_batch::mesh::triangle_order::TriangleSorter;
-use gdt_batch::output::attributes::PointAttributes;
-use gdt_batch::output::frame::Frame;
-use gdt_batch::output::gltf::read::{TileFile, TilePart, read_tile};
-use gdt_batch::output::{Compression, Tile};
-use gdt_batch::verify::SourceGrid;
+use delaunay::geometry::Bounds;
+use delaunay::mesh::triangle_order::TriangleSorter;
 use proptest::prelude::*;
+use sys::Error;
+use tiles::attributes::PointAttributes;
+use tiles::frame::Frame;
+use tiles::gltf::read::{TileFile, TilePart, read_tile};
+use tiles::{Compression, Tile};
+use verify::SourceGrid;
 
 use crate::model::{COMPRESSIONS, attributed, cloud, cut, encode_tile, framed, grid, lattice, terrain, utm};
 use crate::random::Random;
@@ -19,7 +19,7 @@ fn written(frame: &Frame, tile: &Tile) -> Vec<u8> {
     encode_tile(frame, tile, Compression::None).unwrap()
 }
 
-fn read_bytes(bytes: &[u8]) -> gdt_batch::Result<TileFile> {
+fn read_bytes(bytes: &[u8]) -> sys::Result<TileFile> {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), bytes).unwrap();
     read_tile(file.path())

@@ -1,7 +1,7 @@
 //! Tests that verification finds every kind of fault.
 
-use gdt_batch::output::Tile;
-use gdt_batch::verify::{Verdict, verify};
+use tiles::Tile;
+use verify::{Verdict, verify};
 
 use crate::model::{COMPRESSIONS, cloud, cut_by_place, edges, grid, terrain, utm, write_tiles, write_tiles_as};
 
@@ -55,7 +55,7 @@ fn a_flipped_edge_is_found() {
         let tile = &mut tiles[4];
         let edges = edges(&tile.triangles);
         let site = |v: u32| [tile.positions[v as usize][0], tile.positions[v as usize][1]];
-        let left = |a, b, c| gdt_batch::geometry::predicates::orient2d(site(a), site(b), site(c)) > 0;
+        let left = |a, b, c| delaunay::geometry::predicates::orient2d(site(a), site(b), site(c)) > 0;
         let convex = |&(&(u, v), &(_, apex)): &(&(u32, u32), &(usize, u32))| {
             edges.get(&(v, u)).is_some_and(|&(_, other)| left(apex, u, other) && left(other, v, apex))
         };

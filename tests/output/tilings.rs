@@ -1,15 +1,15 @@
 //! Tests that verification accepts exact meshes, however they are cut, and that its digest depends on the triangles alone.
 
-use gdt_batch::output::Compression;
-use gdt_batch::output::frame::Frame;
-use gdt_batch::verify::{Verdict, verify};
+use tiles::Compression;
+use tiles::frame::Frame;
+use verify::{Verdict, verify};
 
 use crate::model::{cloud, cut, cut_by_place, grid, lattice, terrain, utm, write_tiles, write_tiles_as};
 use crate::random::Random;
 
 const MEMORY: u64 = 1 << 28;
 
-fn verdict_of(frame: &Frame, tiles: &[gdt_batch::output::Tile]) -> Verdict {
+fn verdict_of(frame: &Frame, tiles: &[tiles::Tile]) -> Verdict {
     let directory = tempfile::tempdir().unwrap();
     write_tiles(directory.path(), frame, tiles);
     verify(directory.path(), MEMORY).unwrap()

@@ -144,7 +144,7 @@ fn a_job_killed_while_its_results_take_their_places_is_complete_after_the_next_r
         rig.configure(&base());
         assert!(rig.run_to("replacing", count).was_killed(), "{count} of {steps}");
         assert!(!rig.out().join("report.json").exists(), "some results are old and some are new");
-        let refused = gdt_batch::verify::verify(&rig.out(), 1 << 28).unwrap_err();
+        let refused = verify::verify(&rig.out(), 1 << 28).unwrap_err();
         assert!(refused.exit_code() == 1 && refused.to_string().contains("run the job again"), "{refused}");
         // Whatever the next run is asked for, it finds the results whole.
         match count % 3 {

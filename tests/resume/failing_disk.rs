@@ -26,7 +26,7 @@ fn run_with(earlier: &Earlier, fault: &str) -> (bool, bool) {
     assert!(end.err.contains("Input/output error") && end.err.contains("error: cannot "), "{fault}: {}", end.err);
     let was_placing = !rig.out().join("report.json").exists();
     if was_placing {
-        let refused = gdt_batch::verify::verify(&rig.out(), 1 << 28).unwrap_err().to_string();
+        let refused = verify::verify(&rig.out(), 1 << 28).unwrap_err().to_string();
         assert!(refused.contains("not all in place: run the job again"), "{fault}: {refused}");
         // The next run puts them in place, even if its own inputs are gone.
         rig.configure(&Setup { input: "files = [\"gone.csv\"]".into(), ..base() });

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use gdt_batch::job::durable::directory::{JobDirectory, STORE_FILES};
+use job::durable::directory::{JobDirectory, STORE_FILES};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -247,8 +247,8 @@ impl Rig {
         let differ = self.expected.iter().filter(|(name, bytes)| found[*name] != **bytes);
         let differ: Vec<&String> = differ.map(|(name, _)| name).collect();
         assert!(differ.is_empty(), "{what}: other bytes in {differ:?}");
-        let verdict = gdt_batch::verify::verify(&self.out(), 1 << 28).unwrap();
-        assert_eq!(verdict.verdict, gdt_batch::verify::Conclusion::Proved, "{what}: {verdict}");
+        let verdict = verify::verify(&self.out(), 1 << 28).unwrap();
+        assert_eq!(verdict.verdict, verify::Conclusion::Proved, "{what}: {verdict}");
         fs::read(self.out().join("report.json")).unwrap()
     }
 

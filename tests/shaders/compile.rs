@@ -1,6 +1,6 @@
 //! From WGSL to SPIR-V, as wgpu does it for a device of these abilities (`wgpu-hal`, `src/vulkan/adapter.rs`, `naga_options`).
 
-use gdt_batch::gpu::recording::ShaderProgram;
+use delaunay_gpu::recording::ShaderProgram;
 use naga::back::spv::{Capability, Options, WriterFlags, ZeroInitializeWorkgroupMemoryMode, write_vec};
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validator};

@@ -1,10 +1,10 @@
 //! The programs: all entry points of all shaders.
 
-use gdt_batch::geometry::Site;
-use gdt_batch::gpu::atlas::Atlas;
-use gdt_batch::gpu::options::VoronoiMethod;
-use gdt_batch::gpu::recording::{GpuCommand, Recording, ShaderProgram};
-use gdt_batch::voronoi::texture_request::{TextureRequest, TextureResolution};
+use delaunay::geometry::Site;
+use delaunay::voronoi::texture_request::{TextureRequest, TextureResolution};
+use delaunay_gpu::atlas::Atlas;
+use delaunay_gpu::options::VoronoiMethod;
+use delaunay_gpu::recording::{GpuCommand, Recording, ShaderProgram};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;

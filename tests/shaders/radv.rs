@@ -3,7 +3,7 @@
 use crate::compile::{Abilities, Compiled};
 use crate::statistics::Statistics;
 use ash::vk::{self, PipelineExecutableStatisticFormatKHR as Format};
-use gdt_batch::gpu::recording::ShaderProgram;
+use delaunay_gpu::recording::ShaderProgram;
 use std::ffi::{CStr, CString};
 
 /// The GPU to compile for: a Radeon RX 6800. The driver reads it from the environment.

@@ -2,13 +2,13 @@
 
 use crate::clean::Segment;
 use crate::cut::cuts;
-use crate::drowned::Drowned;
 use crate::edge_table::{Edge, EdgeTable};
 use crate::error::BreaklineError;
 use crate::exact::in_disc;
 use crate::feature::FeatureKind;
 use crate::findings::Findings;
 use crate::lakes::{Fraction, Lakes, Shore};
+use crate::lines_in_lakes::LinesInLakes;
 use crate::node::Noding;
 use crate::options::BreaklineOptions;
 use crate::owners::{Owner, Owners};
@@ -123,7 +123,7 @@ fn choose(
         return Ok((pieces, Vec::new()));
     }
     let insides = Lakes::new(lakes, shores_of(segments, &pieces, sites));
-    let (mut is_kept, mut left_out, mut drowned) = (Vec::new(), Vec::new(), Drowned::default());
+    let (mut is_kept, mut left_out, mut drowned) = (Vec::new(), Vec::new(), LinesInLakes::default());
     for (number, Edge { ends, owners, .. }) in pieces.edges.iter().enumerate() {
         if number % SOME == 0 {
             interrupt::check()?;

@@ -16,8 +16,8 @@ pub fn from_records(
     let text = from_texts(texts, warnings)?;
     let (records, keys) = (keys, geotiff::parse(keys));
     let used = text.as_ref().or(keys.as_ref());
-    let doubts = text.as_ref().map_or_else(|| geotiff::doubts(records), Crs::doubts);
-    for doubt in doubts {
+    let problems = text.as_ref().map_or_else(|| geotiff::problems(records), Crs::problems);
+    for doubt in problems {
         let label = used.map_or("unknown".into(), Crs::label);
         warnings
             .push(format!("its coordinate system ({label}): {doubt} (set [input] crs or unit to say what is meant)"));

@@ -39,7 +39,7 @@ fn unit_of(keys: &GeoKeys, code: u16, size: u16) -> Option<f64> {
 }
 
 /// Says what of the keys is there, but cannot be used.
-pub(crate) fn doubts(keys: &GeoKeys) -> Vec<String> {
+pub(crate) fn problems(keys: &GeoKeys) -> Vec<String> {
     let unit = keys.code(LINEAR_UNITS).filter(|_| linear_unit(keys).is_none()).map(|code| match code {
         USER_DEFINED => format!("GeoTIFF key {LINEAR_UNIT_SIZE}, the unit of x and y, is no length"),
         code => format!("GeoTIFF key {LINEAR_UNITS}, the unit of x and y, has the code {code}, which is not known"),

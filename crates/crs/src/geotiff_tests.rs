@@ -3,7 +3,7 @@
 use crate::from_wkt::from_epsg;
 use crate::geokeys::{DOUBLES, TEXTS};
 use crate::geokeys::{GeoKeys, USER_DEFINED};
-use crate::geotiff::{doubts, parse};
+use crate::geotiff::{parse, problems};
 use crate::system::{Crs, CrsKind};
 use crate::unit::Unit;
 
@@ -30,7 +30,8 @@ fn a_unit_key_wins_over_the_code() {
         parse(&records(&[[1024, 0, 1, 1], [3072, 0, 1, 32104], [3076, 0, 1, 9003], [4099, 0, 1, 9003]], &[])).unwrap();
     assert_eq!((crs.horizontal, crs.vertical), (Unit::UsFoot, Some(Unit::US_FOOT)));
     assert_eq!(crs.wkt, None);
-    let told = |unit: u16| doubts(&records(&[[1024, 0, 1, 1], [3072, 0, 1, 32104], [3076, 0, 1, unit]], &[])).concat();
+    let told =
+        |unit: u16| problems(&records(&[[1024, 0, 1, 1], [3072, 0, 1, 32104], [3076, 0, 1, unit]], &[])).concat();
     assert!(told(9003).contains("says US survey foot, and EPSG:32104 has them in metre"), "{}", told(9003));
     assert_eq!(told(9001), "");
 }
@@ -98,28 +99,28 @@ fn a_parameter_that_is_missing_or_unreadable_leaves_the_projection_unknown() {
     let geographic = [[1024, 0, 1, 1], [2048, 0, 1, 4269], [3072, 0, 1, USER_DEFINED], [3076, 0, 1, 9001]];
     let all: Vec<[u16; 4]> = geographic.into_iter().chain(PARAMETERS).collect();
     let doubles = [-93.0, 0.0, 500_000.0, 0.9996, f64::NAN];
-    let doubts = |changed: u16, entry: Option<[u16; 4]>| {
+    let problems = |changed: u16, entry: Option<[u16; 4]>| {
         let keys: Vec<[u16; 4]> = all.iter().filter(|key| key[0] != changed).copied().chain(entry).collect();
         let keys = records(&keys, &doubles);
-        let (crs, doubts) = (parse(&keys).unwrap(), doubts(&keys));
-        assert_eq!(crs.proj4_definition().is_some(), doubts.is_empty(), "{changed}: {doubts:?}");
+        let (crs, problems) = (parse(&keys).unwrap(), problems(&keys));
+        assert_eq!(crs.proj4_definition().is_some(), problems.is_empty(), "{changed}: {problems:?}");
         assert_eq!(crs.kind, CrsKind::Projected);
-        doubts.concat()
+        problems.concat()
     };
-    assert_eq!(doubts(0, None), "");
-    assert!(doubts(3080, None).ends_with("it does not give the longitude of the origin"));
-    assert!(doubts(3081, None).ends_with("it does not give the latitude of the origin"));
+    assert_eq!(problems(0, None), "");
+    assert!(problems(3080, None).ends_with("it does not give the longitude of the origin"));
+    assert!(problems(3081, None).ends_with("it does not give the latitude of the origin"));
     // GeoTIFF, like well-known text, has a value for these.
     for key in [3082, 3083, 3092] {
-        assert_eq!(doubts(key, None), "", "{key}");
+        assert_eq!(problems(key, None), "", "{key}");
     }
     for key in [3080, 3081, 3082, 3083, 3092, 2061] {
         for entry in [[key, DOUBLES, 1, 4], [key, DOUBLES, 1, 90], [key, 0, 1, 7]] {
-            assert!(doubts(key, Some(entry)).ends_with(&format!("key {key} has no number that can be read")));
+            assert!(problems(key, Some(entry)).ends_with(&format!("key {key} has no number that can be read")));
         }
     }
     for entry in [[3076, 0, 1, 9999], [3076, 0, 1, USER_DEFINED]] {
-        assert!(doubts(3076, Some(entry)).contains("the unit of x and y"));
+        assert!(problems(3076, Some(entry)).contains("the unit of x and y"));
     }
 }
 
@@ -130,12 +131,12 @@ fn longitudes_in_another_angle_than_their_code_has_are_not_read() {
         let crs = parse(&keys).unwrap();
         assert!(crs.form().is_none() && crs.is_named() && crs.kind == CrsKind::Geographic, "{code} {unit}: {crs:?}");
         assert!(
-            doubts(&keys)[0].contains(&format!("key 2054, the unit of longitude and latitude, has the code {unit}"))
+            problems(&keys)[0].contains(&format!("key 2054, the unit of longitude and latitude, has the code {unit}"))
         );
     }
     for (code, unit) in [(4326, 9102), (4326, 9122), (4807, 9105)] {
         let keys = records(&[[1024, 0, 1, 2], [2048, 0, 1, code], [2054, 0, 1, unit]], &[]);
-        assert!(parse(&keys).unwrap().form().is_some() && doubts(&keys).is_empty(), "{code} {unit}");
+        assert!(parse(&keys).unwrap().form().is_some() && problems(&keys).is_empty(), "{code} {unit}");
     }
 }
 
@@ -146,10 +147,10 @@ fn longitude_and_latitude_may_be_defined_by_keys() {
     let mut keys = records(&keys, &[]);
     keys.texts = b"WGS 84|".to_vec();
     assert_eq!(parse(&keys).unwrap().differences(&from_epsg(4326).unwrap()), [""; 0]);
-    assert!(doubts(&keys).is_empty());
+    assert!(problems(&keys).is_empty());
     // Without an ellipsoid, nobody can tell.
     let keys = records(&[[1024, 0, 1, 2], [2048, 0, 1, USER_DEFINED]], &[]);
-    assert!(doubts(&keys)[0].contains("do not say its datum"));
+    assert!(problems(&keys)[0].contains("do not say its datum"));
 }
 
 #[test]
@@ -216,20 +217,20 @@ fn projections_that_only_codes_and_methods_define_are_told_apart_by_their_keys()
 
 #[test]
 fn keys_that_are_not_known_are_a_doubt() {
-    let doubts = |keys: &[[u16; 4]]| {
+    let problems = |keys: &[[u16; 4]]| {
         let base = [[1024, 0, 1, 1], [2048, 0, 1, 4269], [3076, 0, 1, 9001]];
-        doubts(&records(&[&base[..], keys].concat(), &[-93.0, 0.0, 500_000.0, 0.9996])).concat()
+        problems(&records(&[&base[..], keys].concat(), &[-93.0, 0.0, 500_000.0, 0.9996])).concat()
     };
     assert!(
-        doubts(&[[3072, 0, 1, USER_DEFINED], [3074, 0, 1, 10_131]])
+        problems(&[[3072, 0, 1, USER_DEFINED], [3074, 0, 1, 10_131]])
             .contains("key 3074, its projection, has the code 10131")
     );
     let method = [[3072, 0, 1, USER_DEFINED], [3074, 0, 1, USER_DEFINED], [3075, 0, 1, 3]];
-    assert!(doubts(&method).contains("key 3075, the method of its projection, has the code 3"));
+    assert!(problems(&method).contains("key 3075, the method of its projection, has the code 3"));
     let angles = [&[[3072, 0, 1, USER_DEFINED], [2054, 0, 1, 9103]], &PARAMETERS[..]].concat();
-    assert!(doubts(&angles).contains("key 2054, the unit of its angles, has the code 9103"));
-    assert!(doubts(&[[3072, 0, 1, 50_001]]).contains("EPSG:50001 is not in the list of known codes"));
-    assert_eq!(doubts(&[[3072, 0, 1, 26915]]), "");
+    assert!(problems(&angles).contains("key 2054, the unit of its angles, has the code 9103"));
+    assert!(problems(&[[3072, 0, 1, 50_001]]).contains("EPSG:50001 is not in the list of known codes"));
+    assert_eq!(problems(&[[3072, 0, 1, 26915]]), "");
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Coordinate reference systems, as far as a terrain needs them: the units, a text for readers, and whether two systems agree.
-//! This room knows no files: the readers of file formats hand it the records that describe the system.
+//! This crate knows no files: the readers of file formats hand it the records that describe the system.
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
@@ -10,7 +10,6 @@ pub(crate) mod codes;
 pub mod crs_name;
 pub mod datum;
 pub(crate) mod datum_names;
-pub(crate) mod doubts;
 pub(crate) mod form;
 pub mod from_records;
 pub mod from_wkt;
@@ -22,6 +21,7 @@ pub(crate) mod geotiff_esri;
 mod geotiff_tests;
 pub(crate) mod geotiff_text;
 pub mod plausible;
+pub(crate) mod problems;
 pub(crate) mod proj4;
 pub(crate) mod projection;
 pub(crate) mod projection_names;

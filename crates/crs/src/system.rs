@@ -402,9 +402,9 @@ mod tests {
             .replace("\"central_meridian\",9", "\"central_meridian\",12");
         let wrong = Crs { epsg: Some(31467), ..parse(&text).unwrap() };
         assert_eq!(right.differences(&wrong), ["the longitude of the origin (9, 12)"]);
-        assert_eq!(right.doubts(), [""; 0]);
+        assert_eq!(right.problems(), [""; 0]);
         let doubt = "its text and its code EPSG:31467 differ in the longitude of the origin (12, 9); the text is used";
-        assert_eq!(wrong.doubts(), [doubt]);
+        assert_eq!(wrong.problems(), [doubt]);
         // The code would place it elsewhere.
         assert!(!wrong.proj4_definition().unwrap_or_default().contains("+lon_0=9 "), "{:?}", wrong.proj4_definition());
         // The dataset has renamed this datum, and the code is still the same.

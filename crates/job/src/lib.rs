@@ -1,4 +1,4 @@
-//! A job, from the options to the report. [`run()`] shows its walk through the steps; each step has a room of its own.
+//! A job, from the options to the report. [`run()`] shows its walk through the steps; each step has a module of its own.
 //!
 //! A step that runs once for each tile or node takes the plan, the results of the steps for the whole job (the tree, the style), the
 //! index and the store, but never the running job. It finds in the store what earlier steps wrote, and writes its own result there.
@@ -117,7 +117,7 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
     // Steps 3 and 4, mesh/: leaves and merges. Steps 5 and 6, tiles/: border normals and tiles, each as soon as it is finished.
     let mesh = mesh_and_tiles(run, &plan, &partition, bounds)?;
     let tiles = &mesh.tiles;
-    let look = tiles.look.as_ref().ok_or_else(|| Error::Broken("the tiles have no look".into()))?;
+    let appearance = tiles.appearance.as_ref().ok_or_else(|| Error::Broken("the tiles have no appearance".into()))?;
     some_triangles(&tiles.stats, &plan)?;
     // From here on the store is enough.
     run_concurrently(
@@ -126,7 +126,7 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
             // Step 7, levels/: coarser tiles.
             let levels = wants_tileset(&plan, &tiles.stats).then(|| {
                 let hierarchy = hierarchy_of(&plan, &partition);
-                make_levels(run, &plan, PartIndex::FIRST, hierarchy, &look.style, &no_other_part)
+                make_levels(run, &plan, PartIndex::FIRST, hierarchy, &appearance.style, &no_other_part)
             });
             let levels = levels.transpose()?;
             // Step 8, publish/: what is beside the tiles, and the report.
@@ -139,7 +139,7 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
             let (tileset, all) = (tileset.transpose()?, StoredTiles { store: run.store, tree });
             let files =
                 WrittenFiles { stats: tiles.stats, hull: Seam::hull_count(run.store, NodeIndex::ROOT)?, tiles: &all };
-            let published = publish(run, &plan, bounds, &files, look, tileset)?;
+            let published = publish(run, &plan, bounds, &files, appearance, tileset)?;
             let figures = MeshFigures {
                 points: summary.counts.clone(),
                 leaves: mesh.leaves,

@@ -1,4 +1,4 @@
-//! The options of a job: those of each room, and `[limits]`.
+//! The options of a job: those of each crate, and `[limits]`.
 
 use crate::progress::stage::ProgressOutput;
 use delaunay_gpu::options::GpuOptions;

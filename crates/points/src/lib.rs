@@ -3,7 +3,7 @@
 //! [`open()`] looks at one file and returns a [`Source`]. Its chunks are decoded independently, on any thread. Every record passes
 //! the filter, which applies the [`PointRules`], and [`PointCounts`] says what happened to the records.
 //!
-//! A new file format is a room of its own beside `las` and `text`, and a variant of `PointData` in `source.rs`.
+//! A new file format is a module of its own beside `las` and `text`, and a variant of `PointData` in `source.rs`.
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
@@ -20,12 +20,12 @@ mod other_formats;
 mod points;
 mod read_ahead;
 mod remote;
-mod said_crs;
 pub mod samples;
 mod source;
 mod source_transform;
+mod stated_crs;
 pub mod surface;
-pub mod surface_doubts;
+pub mod surface_warnings;
 mod text;
 pub mod transform_sources;
 mod transform_warnings;
@@ -51,7 +51,7 @@ pub use measured::{MeasuredPoints, PlausiblePoints};
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;
 pub use points::kept_heights::KeptHeights;
-pub use points::nodata::{DoubtfulHeight, Extremes, is_nodata_beside, is_number_in_steps, shown_height, who_has};
+pub use points::nodata::{Extremes, SuspectHeight, is_nodata_beside, is_number_in_steps, shown_height, who_has};
 pub use points::nodata_choice::NodataChoice;
 pub use points::optional_fields::OptionalFields;
 pub use points::point::Point;

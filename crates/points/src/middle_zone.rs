@@ -1,8 +1,8 @@
 //! The UTM zone in the middle of the data, for `to_crs = "utm"`.
 
 use crate::options::InputOptions;
-use crate::said_crs::no_way;
 use crate::source::Source;
+use crate::stated_crs::no_way;
 use crate::transform_warnings::is_around_the_earth;
 use crs::system::Crs;
 use crs::transform::between::CrsTransform;

@@ -2,9 +2,9 @@
 
 use crate::middle_zone::zone_of_middle;
 use crate::options::{InputOptions, UnitChoice};
-use crate::said_crs::{no_way, said_crs, said_or_missing};
 use crate::source::{FileFormat, Source};
 use crate::source_transform::SourceTransform;
+use crate::stated_crs::{no_way, stated_crs, stated_or_missing};
 use crate::transform_warnings::{
     warn_of_coarse_degrees, warn_of_date_line, warn_of_datums, warn_of_heights, warn_of_lengths, warn_of_overruled,
     warn_of_scale,
@@ -37,12 +37,12 @@ pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warning
     }
     let Some(target) = &options.to_crs else {
         for source in sources.iter_mut().filter(|_| options.missing_crs.is_some()) {
-            source.crs = said_or_missing(source, options)?;
+            source.crs = stated_or_missing(source, options)?;
         }
         take_units_of_false_records(sources, options);
         return Ok(());
     };
-    let said = sources.iter().map(|source| said_crs(source, sources, options)).collect::<Result<Vec<Crs>>>()?;
+    let said = sources.iter().map(|source| stated_crs(source, sources, options)).collect::<Result<Vec<Crs>>>()?;
     refuse_impossible_latitudes(sources, &said)?;
     warn_of_overruled(sources, &said, options, warnings);
     warn_of_lengths(sources, &said, options, warnings);

@@ -2,7 +2,7 @@
 //! tells what is there, so that an error never passes for "nothing is there".
 //!
 //! It adds little to the calls of the system. But builds for tests can write down every change, and then make up what a power
-//! failure at any moment may leave of them (CONTRIBUTING.md). The test `rooms` finds changes that go around this layer.
+//! failure at any moment may leave of them (CONTRIBUTING.md). The test `architecture` finds changes that go around this layer.
 
 use crate::fault::traced;
 use crate::{fault, positional_io};
@@ -41,8 +41,8 @@ pub fn set_length(file: &File, length: u64) -> Result<()> {
     traced(|| file.set_len(length), |()| (format!("length {} {length}", number(file)), &[]))
 }
 
-/// Gives the room of `ranges` of `file` back to the disk: they read as zeros afterwards. Returns the number of bytes. A system or a
-/// file system that cannot do it keeps them, which costs room and nothing else.
+/// Gives the space of `ranges` of `file` back to the disk: they read as zeros afterwards. Returns the number of bytes. A system or a
+/// file system that cannot do it keeps them, which costs space and nothing else.
 pub fn free(file: &File, ranges: &[Range<u64>]) -> Result<u64> {
     let mut freed = 0;
     for range in ranges {

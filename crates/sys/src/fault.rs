@@ -30,7 +30,7 @@ pub fn read(name: &str) -> io::Result<()> {
 const EIO: i32 = 5;
 
 #[cfg(feature = "remote")]
-pub use injection::network_patience;
+pub use injection::network_timeout;
 pub use injection::{commit_interval, is_due, is_signalled, mark, processors, traced};
 
 #[cfg(feature = "fault-injection")]
@@ -83,7 +83,7 @@ mod injection {
 
     /// Returns how long servers may be silent if a test sets it (`GDT_PATIENCE_MS`).
     #[cfg(feature = "remote")]
-    pub fn network_patience() -> Option<Duration> {
+    pub fn network_timeout() -> Option<Duration> {
         std::env::var("GDT_PATIENCE_MS").ok()?.parse().ok().map(Duration::from_millis)
     }
 
@@ -152,7 +152,7 @@ mod injection {
     #[cfg(feature = "remote")]
     /// The usual time.
     #[inline(always)]
-    pub fn network_patience() -> Option<Duration> {
+    pub fn network_timeout() -> Option<Duration> {
         None
     }
 

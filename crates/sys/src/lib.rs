@@ -22,5 +22,5 @@ pub use warnings::Warnings;
 /// Writes a message to standard error, as a terminal can show it. A closed or full standard error must not end the job, so failures are ignored.
 pub fn say(text: &str) {
     use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "{}", terminal::harmless(text));
+    let _ = writeln!(std::io::stderr(), "{}", terminal::escape_controls(text));
 }

@@ -9,7 +9,7 @@ const LONGEST: usize = 4000;
 const ENDS: [usize; 2] = [2000, 500];
 
 /// Returns a text with control characters written as in `\u{1b}`, and without the middle of very long lines. Its lines and tabs stay.
-pub fn harmless(text: &str) -> String {
+pub fn escape_controls(text: &str) -> String {
     text.split('\n').map(|line| shortened(&escaped(line, |c| c == '\t'))).collect::<Vec<_>>().join("\n")
 }
 
@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn a_terminal_obeys_nothing() {
-        assert_eq!(harmless("a\u{1b}[31m b\tc\nd\r\u{9b}\u{202e}e"), "a\\u{1b}[31m b\tc\nd\\r\\u{9b}\\u{202e}e");
+        assert_eq!(escape_controls("a\u{1b}[31m b\tc\nd\r\u{9b}\u{202e}e"), "a\\u{1b}[31m b\tc\nd\\r\\u{9b}\\u{202e}e");
         assert_eq!(one_line("a\nb\tc ü"), "a\\nb\\tc ü");
         assert_eq!(one_line("a\u{200b}b\u{feff}c\u{2060}d\u{ad}"), "a\\u{200b}b\\u{feff}c\\u{2060}d\\u{ad}");
         assert_eq!(name(Path::new("x\u{7}.laz")), "x\\u{7}.laz");
@@ -74,9 +74,9 @@ mod tests {
     #[test]
     fn a_long_line_loses_its_middle() {
         let whole = "ü".repeat(LONGEST);
-        assert_eq!(harmless(&format!("a\n{whole}")), format!("a\n{whole}"));
-        let short = harmless(&format!("{whole}xyz\nb"));
+        assert_eq!(escape_controls(&format!("a\n{whole}")), format!("a\n{whole}"));
+        let short = escape_controls(&format!("{whole}xyz\nb"));
         assert!(short.contains("[1503 characters left out]") && short.ends_with("xyz\nb"), "{short}");
-        assert!(harmless(&"x".repeat(50_000_000)).len() < 3000);
+        assert!(escape_controls(&"x".repeat(50_000_000)).len() < 3000);
     }
 }

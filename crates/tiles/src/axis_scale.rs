@@ -12,7 +12,7 @@ const F32_STEPS: i64 = 1 << 24;
 pub(crate) const TRANSLATION_STEPS: i64 = 1 << 16;
 
 /// Half the extent in steps of the widest mesh that one translation serves, wherever it lies.
-pub(crate) const PART_REACH: i64 = F32_STEPS - TRANSLATION_STEPS / 2;
+pub(crate) const NODE_REACH: i64 = F32_STEPS - TRANSLATION_STEPS / 2;
 
 /// Steps are refined below half the resolution by at most this factor, and not below [`FINE_STEP`].
 const REFINEMENT: f64 = 64.0;
@@ -62,13 +62,13 @@ impl AxisScale {
 
     /// Returns the length in metres of the longest line that one mesh can hold.
     pub(crate) fn longest(self) -> f64 {
-        2.0 * PART_REACH as f64 * self.step
+        2.0 * NODE_REACH as f64 * self.step
     }
 
     /// Returns the map with a step as fine as a mesh that spans `lattice_steps` allows, within reason.
     pub(crate) fn refined(self, lattice_steps: i64) -> AxisScale {
         let resolution = self.ratio * self.step;
-        let spanning = power_above(lattice_steps as f64 * resolution / (2 * PART_REACH) as f64);
+        let spanning = power_above(lattice_steps as f64 * resolution / (2 * NODE_REACH) as f64);
         let step = self.step.min(spanning.max(FINE_STEP).max(self.step / REFINEMENT));
         AxisScale { step, ratio: resolution / step }
     }

@@ -220,7 +220,7 @@ impl Frame {
         if self.curvature().is_some() { self.extent(points) } else { self.extent(&[bounds.min, bounds.max]) }
     }
 
-    /// Returns the glTF coordinates in metres of a lattice point relative to an origin in steps. They are exact within `PART_REACH`
+    /// Returns the glTF coordinates in metres of a lattice point relative to an origin in steps. They are exact within `NODE_REACH`
     /// of it.
     #[inline(always)]
     pub(crate) fn local(&self, point: [i32; 3], origin: [f64; 3]) -> [f32; 3] {

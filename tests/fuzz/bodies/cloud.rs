@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use gdt_batch::geometry::REACH;
-use gdt_batch::geometry::lattice::AxisMap;
-use gdt_batch::input::{KeptReturns, OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
-use gdt_batch::job::options::JobOptions;
-use gdt_batch::{Error, Result};
+use ::job::options::JobOptions;
+use delaunay::geometry::REACH;
+use lattice::AxisMap;
+use points::{KeptReturns, OptionalFields, Point, PointCounts, PointRules, Source, TextOptions, open};
+use sys::{Error, Result};
 
 use super::{job, with_file};
 

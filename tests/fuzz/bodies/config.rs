@@ -1,7 +1,7 @@
 //! A configuration of any bytes, and a whole job with it.
 
-use gdt_batch::job::options::{JobOptions, Threads};
-use gdt_batch::triangulation::options::Backend;
+use ::job::options::{JobOptions, Threads};
+use delaunay_gpu::triangulation_options::Backend;
 
 use super::{job, with_file};
 

@@ -1,9 +1,9 @@
 //! Whole jobs: whatever the input, a job ends with an error that a user can act on, or with an output that verifies.
 
-use gdt_batch::job::options::{JobOptions, RunOptions};
-use gdt_batch::job::preflight::check;
-use gdt_batch::job::progress::stage::ProgressOutput;
-use gdt_batch::{Error, job, verify};
+use job::options::{JobOptions, RunOptions};
+use job::preflight::check;
+use job::progress::stage::ProgressOutput;
+use sys::Error;
 
 use super::with_file;
 

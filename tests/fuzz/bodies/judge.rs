@@ -3,9 +3,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use gdt_batch::geometry::Site;
-use gdt_batch::mesh::half_edge::HalfEdgeMesh;
-use gdt_batch::mesh::index::HalfEdgeIndex;
+use delaunay::geometry::Site;
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::mesh::index::HalfEdgeIndex;
 
 /// Panics unless every triangle turns left, edges meet in pairs, the hull is convex and holds every site on it, Euler's formula
 /// holds, and every edge is Delaunay with ties decided by the rule: the lexicographically last of four counts as outside.

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use gdt_batch::geometry::Site;
-use gdt_batch::mesh::half_edge::HalfEdgeMesh;
-use gdt_batch::triangulation::options::{Backend, TriangulationOptions};
-use gdt_batch::triangulation::{Triangulator, reference};
+use delaunay::geometry::Site;
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::triangulation::reference;
+use delaunay_gpu::triangulation_options::{Backend, TriangulationOptions};
+use delaunay_gpu::triangulator::Triangulator;
 
 use super::judge;
 
@@ -17,7 +18,7 @@ const MAX_SITES: usize = 1500;
 pub(crate) fn sites(bytes: &[u8]) {
     let sites = sites_of(bytes);
     let wanted = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
-    let triangulator = Triangulator::new(&wanted, &gdt_batch::gpu::options::GpuOptions::default(), 1 << 28)
+    let triangulator = Triangulator::new(&wanted, &delaunay_gpu::options::GpuOptions::default(), 1 << 28)
         .expect("the CPU is always there");
     let (mesh, _) = triangulator.triangulate(&sites).expect("a mesh of distinct sites");
     judge::judge(&sites, &mesh);

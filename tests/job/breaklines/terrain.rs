@@ -4,9 +4,9 @@ use std::collections::{BTreeSet, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use gdt_batch::output::gltf::read::read_tile;
 use serde_json::Value;
 use tempfile::TempDir;
+use tiles::gltf::read::read_tile;
 
 use super::files::{Features, geojson, geopackage, shapefile};
 use crate::program::Job;

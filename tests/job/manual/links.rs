@@ -30,7 +30,7 @@ fn sources_that_pages_for_developers_name_are_there() {
         "tests/gpu",
         "tests/job",
         "tests/resume",
-        "tests/rooms",
+        "tests/architecture",
         "tests/shaders",
     ]
     .map(|name| root().join(name));

@@ -189,7 +189,7 @@ impl Place {
 
     /// Serves the results and looks whether it says its address. A program without the page says how it is built in.
     fn view(&self, words: &[String], at: &str) {
-        if !gdt_batch::output::page::is_built_in() {
+        if !tiles::page::is_built_in() {
             return gdt_batch(self.folder.path(), words).refused(2, &["npm run build --prefix viewer"]);
         }
         if !self.folder.path().join(&words[1]).exists() {
@@ -216,7 +216,7 @@ fn completed(mut job: Table) -> Table {
         }
     }
     let page = job["output"].get("page").and_then(Value::as_bool);
-    if page == Some(true) && !gdt_batch::output::page::is_built_in() {
+    if page == Some(true) && !tiles::page::is_built_in() {
         job["output"].as_table_mut().unwrap().insert("page".into(), false.into());
     }
     job

@@ -96,7 +96,7 @@ fn mercators_parallel_is_never_dropped() {
     assert_eq!(both.differences(&parallel), [""; 0]);
     assert!(both.differences(&plain)[0].contains("scale factor"));
     let odd = r#"["Mercator_2SP"],PARAMETER["standard_parallel_1",42],PARAMETER["scale_factor",0.5]"#;
-    assert!(mercator(odd, "").doubts()[0].contains("contradict each other"));
+    assert!(mercator(odd, "").problems()[0].contains("contradict each other"));
 }
 
 #[test]
@@ -125,8 +125,8 @@ fn what_web_mercator_does_not_have_is_not_dropped() {
     };
     let web = extended("+lat_ts=0.0 +lon_0=9 +x_0=0.0 +y_0=0 +k=1.0");
     assert!(CrsTransform::between(&web, &wgs84, DatumRule::Strict).unwrap().apply([0.0, 0.0]).is_some());
-    assert!(extended("+lat_ts=0 +k=0.5").doubts()[0].contains("is a projection that is not known here"));
-    assert!(from_epsg(3857).unwrap().doubts().is_empty());
+    assert!(extended("+lat_ts=0 +k=0.5").problems()[0].contains("is a projection that is not known here"));
+    assert!(from_epsg(3857).unwrap().problems().is_empty());
 }
 
 #[test]

@@ -93,13 +93,13 @@ struct Opened<E> {
     engine: E,
     /// The adapter's name.
     adapter: String,
-    room: Room,
+    capacity: Capacity,
     filling: Filling,
 }
 
 /// What the executor has room for.
 #[derive(Clone, Copy)]
-struct Room {
+struct Capacity {
     /// The most pixels of an atlas.
     max_pixels: u32,
     /// The most sites of leaves that wait while their threads do other work.
@@ -120,11 +120,11 @@ impl Executor {
         };
         let max_bytes = memory / 3 / BYTES_PER_BYTE_BACK;
         let filling = Filling { resolution, max_bytes };
-        let room = Room { max_pixels: MAX_PIXELS, max_waiting: memory / 3 / BYTES_PER_WAITING_SITE };
+        let capacity = Capacity { max_pixels: MAX_PIXELS, max_waiting: memory / 3 / BYTES_PER_WAITING_SITE };
         #[cfg(feature = "fault-injection")]
         if let Some(engine) = FakeEngine::from_environment() {
-            let open = move || Ok(Opened { engine, adapter: "no GPU".into(), room, filling });
-            return Executor::on(open, room, gpu_use);
+            let open = move || Ok(Opened { engine, adapter: "no GPU".into(), capacity, filling });
+            return Executor::on(open, capacity, gpu_use);
         }
         let request = AdapterRequest::new(options.adapter.as_deref(), gpu_use == GpuUse::Required);
         let voronoi = options.voronoi;
@@ -138,25 +138,25 @@ impl Executor {
                 true => limits.pixels.min(u32::try_from(memory / SOFTWARE_BYTES_PER_PIXEL).unwrap_or(u32::MAX)),
                 false => limits.pixels,
             };
-            Ok(Opened { engine, adapter, room: Room { max_pixels, ..room }, filling })
+            Ok(Opened { engine, adapter, capacity: Capacity { max_pixels, ..capacity }, filling })
         };
-        Executor::on(open, room, gpu_use)
+        Executor::on(open, capacity, gpu_use)
     }
 
     fn on<E: MeshEngine + 'static>(
         open: impl FnOnce() -> Result<Opened<E>, GpuError> + Send + 'static,
-        room: Room,
+        capacity: Capacity,
         gpu_use: GpuUse,
     ) -> Result<Executor, String> {
-        let state = Arc::new(GpuState::new(room.max_pixels));
+        let state = Arc::new(GpuState::new(capacity.max_pixels));
         let (sender, receiver) = channel();
         let (tell, told) = sync_channel(1);
         let of_thread = state.clone();
         let run = move || {
             // Nobody listens if the job can do without the GPU.
             match open() {
-                Ok(Opened { engine, adapter, room, filling }) => {
-                    of_thread.max_pixels.store(room.max_pixels, Ordering::Release);
+                Ok(Opened { engine, adapter, capacity, filling }) => {
+                    of_thread.max_pixels.store(capacity.max_pixels, Ordering::Release);
                     of_thread.adapter.get_or_init(|| adapter);
                     let _ = tell.send(Ok(()));
                     GpuThread::new(engine, of_thread, filling).run(&receiver);
@@ -173,7 +173,7 @@ impl Executor {
             told.recv().unwrap_or_else(|_| Err("the GPU's thread has ended".into()))?;
         }
         let benefit = GpuBenefit::new(gpu_use == GpuUse::Required);
-        let (requests, max_waiting) = (Mutex::new(Some(sender)), room.max_waiting);
+        let (requests, max_waiting) = (Mutex::new(Some(sender)), capacity.max_waiting);
         Ok(Executor { requests, state, max_waiting, gpu_use, thread, benefit })
     }
 
@@ -253,7 +253,7 @@ impl Executor {
 
     /// Sends `sites` and waits for their mesh; returns `None` if none is to be expected.
     fn ask(&self, sites: &[Site]) -> Option<MeshReply> {
-        let patience = self.patience(sites.len());
+        let timeout = self.timeout(sites.len());
         let (reply, answer) = sync_channel(1);
         let requests = self.requests.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
         self.state.unanswered.fetch_add(1, Ordering::AcqRel);
@@ -263,7 +263,7 @@ impl Executor {
             self.state.unanswered_sites.fetch_sub(sites.len() as u64, Ordering::AcqRel);
             return None;
         }
-        let reply = self.wait_for(&answer, patience);
+        let reply = self.wait_for(&answer, timeout);
         let is_late = reply.is_none() && self.gpu_use == GpuUse::Optional;
         if is_late && self.state.abandoned.fetch_add(1, Ordering::AcqRel) + 1 >= MOST_ABANDONED {
             self.state.is_gone.store(true, Ordering::Release);
@@ -273,14 +273,14 @@ impl Executor {
     }
 
     /// Returns how long an idle worker waits for the mesh of `sites` sites; `None` if as long as it takes.
-    fn patience(&self, sites: usize) -> Option<Duration> {
+    fn timeout(&self, sites: usize) -> Option<Duration> {
         let alone = self.benefit.seconds_alone(sites).map(|alone| Duration::from_secs_f64(PATIENCE_IN_LEAVES * alone));
         (self.gpu_use == GpuUse::Optional).then(|| alone.map_or(PATIENCE, |alone| alone.min(PATIENCE)))
     }
 
-    /// Waits for an answer, and does other work meanwhile. Returns `None` once this thread has been idle for longer than `patience`, or is
+    /// Waits for an answer, and does other work meanwhile. Returns `None` once this thread has been idle for longer than `timeout`, or is
     /// to stop.
-    fn wait_for(&self, answer: &Receiver<MeshReply>, patience: Option<Duration>) -> Option<MeshReply> {
+    fn wait_for(&self, answer: &Receiver<MeshReply>, timeout: Option<Duration>) -> Option<MeshReply> {
         // The other work may be a leaf that waits too. Beyond the limits, one that does not.
         let may_do_other_work =
             || self.state.waiting.load(Ordering::Acquire) <= self.max_waiting && NESTED.get() <= MOST_NESTED;
@@ -303,7 +303,7 @@ impl Executor {
                 Err(RecvTimeoutError::Timeout) => idle = idle.saturating_add(begun.elapsed().min(10 * NAP)),
             }
             let is_given_up = self.gpu_use == GpuUse::Optional && self.state.is_gone.load(Ordering::Acquire);
-            if is_given_up || patience.is_some_and(|patience| idle > patience) || interrupt::check().is_err() {
+            if is_given_up || timeout.is_some_and(|timeout| idle > timeout) || interrupt::check().is_err() {
                 return None;
             }
         }

@@ -2,9 +2,9 @@
 
 use crate::on_device::atlas::Atlas;
 use crate::on_device::device::MAX_SIDE;
+use crate::on_device::reference_kernels::c4_flip::AT_INFINITY;
 use crate::on_device::returned::ReturnedLayout;
 use crate::on_device::timestamps::STAMP_BYTES;
-use crate::on_device::twins::c4_flip::AT_INFINITY;
 use delaunay::geometry::Site;
 use delaunay::voronoi::texture_request::{TextureRequest, TextureResolution};
 

@@ -21,7 +21,7 @@ const _: () = assert!(FLIP_ROUNDS < 16);
 
 impl Recording {
     /// Decides about each four sites a, b, c, d: the orientation of abc, and whether d is in their circle. The numbers are those of
-    /// [`crate::on_device::twins::predicates::decide`].
+    /// [`crate::on_device::reference_kernels::predicates::decide`].
     pub fn decide(&mut self, quads: &[[Site; 4]]) {
         let (count, (workgroups, invocations)) = (quads.len() as u32, line(quads.len() as u32));
         self.reserve(Sites, 8 * u64::from(count));

@@ -1,6 +1,6 @@
 //! Steps G1 to G6 on a device.
 //!
-//! `shaders/` has one WGSL file per step, and [`twins`] has a plain loop for each that gives the same numbers bit for bit.
+//! `shaders/` has one WGSL file per step, and [`reference_kernels`] has a plain loop for each that gives the same numbers bit for bit.
 //! [`steps`] records which dispatches a step consists of, [`engine`] runs such a [`recording`] on a device, and [`executor`] gets
 //! the meshes of leaves from a thread of its own, many leaves at a time. The crate `delaunay` completes these meshes and proves them.
 
@@ -23,11 +23,11 @@ pub mod mesh_engine;
 pub mod mesh_steps;
 mod passes;
 pub mod recording;
+pub mod reference_kernels;
 pub mod returned;
 pub mod selftest;
 mod staging;
 pub mod steps;
 pub mod texture_size;
 pub mod timestamps;
-pub mod twins;
 mod upload;

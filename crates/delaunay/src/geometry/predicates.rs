@@ -115,7 +115,7 @@ pub struct TriangleBatch {
 
 /// What a [`TriangleBatch`] leaves in doubt: bit `t` is that of triangle `t`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Doubts {
+pub struct Uncertain {
     /// The triangles that may not be counterclockwise.
     pub orientation: u64,
     /// The triangles for which [`in_circle`] may be true with the site beyond side `i`.
@@ -135,16 +135,16 @@ impl TriangleBatch {
     /// Returns what is in doubt about the first `count` triangles. A bit is never clear where [`orient2d`] is not positive, or [`in_circle`]
     /// is true.
     #[inline(always)]
-    pub fn doubts(&self, count: usize) -> Doubts {
-        let Doubts { orientation, sides } = doubts(self, count);
+    pub fn uncertain(&self, count: usize) -> Uncertain {
+        let Uncertain { orientation, sides } = uncertain(self, count);
         let all = u64::MAX >> (TriangleBatch::LANES - count.clamp(1, TriangleBatch::LANES));
-        Doubts { orientation: orientation & all, sides: sides.map(|side| side & all) }
+        Uncertain { orientation: orientation & all, sides: sides.map(|side| side & all) }
     }
 }
 
 // As a function of its own it compiles to vector instructions. Inlined into its callers it might not.
 #[multiversion(targets("x86_64+avx2"), attrs(inline(never)))]
-fn doubts(batch: &TriangleBatch, count: usize) -> Doubts {
+fn uncertain(batch: &TriangleBatch, count: usize) -> Uncertain {
     // Half a word at a time, whose bits have the width of the numbers. Arrays of one constant length need no bounds checks.
     const HALF: usize = TriangleBatch::LANES / 2;
     let TriangleBatch { corners: [a, b, c], beyond: [d, e, f] } = batch;
@@ -174,7 +174,7 @@ fn doubts(batch: &TriangleBatch, count: usize) -> Doubts {
         }
     }
     let [orientation, sides @ ..] = words;
-    Doubts { orientation, sides }
+    Uncertain { orientation, sides }
 }
 
 /// Relative error of what [`LiftedPlane`] computes in single precision. With `e = 2^-24`, a difference is wrong by `e`, a lift by 4 e, a
@@ -227,18 +227,18 @@ fn difference(to: Site, from: Site) -> [f32; 2] {
 /// Returns for each of four counterclockwise triangles and sites whether [`in_circle`] may be true. It is never false where `in_circle` is
 /// true.
 #[inline(always)]
-pub fn four_inside_or_in_doubt(triangles: [[Site; 3]; 4], sites: [Site; 4]) -> [bool; 4] {
-    let mut doubtful = [false; 4];
+pub fn four_inside_or_uncertain(triangles: [[Site; 3]; 4], sites: [Site; 4]) -> [bool; 4] {
+    let mut uncertain = [false; 4];
     for i in 0..4 {
         let [a, b, c] = triangles[i];
-        doubtful[i] = is_inside_or_in_doubt(a, b, c, sites[i]);
+        uncertain[i] = is_inside_or_uncertain(a, b, c, sites[i]);
     }
-    doubtful
+    uncertain
 }
 
 /// Tells in single precision whether [`in_circle`] may be true. It is never false where `in_circle` is true.
 #[inline(always)]
-fn is_inside_or_in_doubt(a: Site, b: Site, c: Site, d: Site) -> bool {
+fn is_inside_or_uncertain(a: Site, b: Site, c: Site, d: Site) -> bool {
     let along = |p: Site, axis: usize| p[axis].wrapping_sub(d[axis]) as f32;
     let (ax, ay, bx, by) = (along(a, 0), along(a, 1), along(b, 0), along(b, 1));
     let (cx, cy) = (along(c, 0), along(c, 1));
@@ -321,12 +321,12 @@ mod tests {
             if orient2d(a, b, c) == 0 || [c, d].iter().flatten().any(|v| v.abs() > 1 << 29) {
                 continue;
             }
-            let doubtful = four_inside_or_in_doubt([[a, b, c]; 4], [d; 4])[1];
+            let uncertain = four_inside_or_uncertain([[a, b, c]; 4], [d; 4])[1];
             let exact = in_circle_determinant(a, b, c, d);
             assert_eq!(in_circle(a, b, c, d), exact > 0 || (exact == 0 && tie(a, b, c, d)));
-            assert!(doubtful || exact < 0, "{a:?} {b:?} {c:?} {d:?}");
+            assert!(uncertain || exact < 0, "{a:?} {b:?} {c:?} {d:?}");
             inside += (exact >= 0) as usize;
-            sure += !doubtful as usize;
+            sure += !uncertain as usize;
         }
         assert!(inside > 10_000 && sure > 10_000);
     }
@@ -351,11 +351,11 @@ mod tests {
             set(&mut batch, t, [a, b, c], [d; 3]);
             quadrilaterals.push([a, b, c, d]);
         }
-        let doubts = batch.doubts(TriangleBatch::LANES);
+        let uncertain = batch.uncertain(TriangleBatch::LANES);
         let inside = (0..)
             .zip(&quadrilaterals)
             .fold(0u64, |inside, (t, &[a, b, c, d])| inside | u64::from(in_circle(a, b, c, d)) << t);
-        assert_eq!(doubts, Doubts { orientation: 0, sides: [inside; 3] });
+        assert_eq!(uncertain, Uncertain { orientation: 0, sides: [inside; 3] });
     }
 
     /// Returns the sign of `value`.
@@ -443,7 +443,7 @@ mod tests {
             prop_assert_eq!(in_circle_determinant(a, b, c, d).signum() as i64, expected);
             if orient2d(a, b, c) > 0 && ![a, b, c].contains(&d) {
                 prop_assert_eq!(in_circle(a, b, c, d), expected > 0 || (expected == 0 && tie(a, b, c, d)));
-                prop_assert!(four_inside_or_in_doubt([[a, b, c]; 4], [d; 4])[0] || expected < 0);
+                prop_assert!(four_inside_or_uncertain([[a, b, c]; 4], [d; 4])[0] || expected < 0);
                 let is_convex = robust_orientation(d, b, c) > 0 && robust_orientation(d, c, a) > 0;
                 prop_assert_eq!(failing_edge(a, b, c, d), in_circle(a, b, c, d).then_some(is_convex));
             }
@@ -460,14 +460,14 @@ mod tests {
             (0..TriangleBatch::LANES).for_each(|t| set(&mut batch, t, [e, f, g], [h; 3]));
             for corners in [[a, b, c], [b, c, a], [c, a, b]] {
                 set(&mut batch, place, corners, [d, h, d]);
-                let doubts = batch.doubts(place + 1);
+                let uncertain = batch.uncertain(place + 1);
                 let is_doubtful = |word: u64| word >> place & 1 != 0;
-                prop_assert!(is_doubtful(doubts.orientation) || orient2d(a, b, c) > 0);
-                for (side, beyond) in doubts.sides.into_iter().zip([d, h, d]) {
+                prop_assert!(is_doubtful(uncertain.orientation) || orient2d(a, b, c) > 0);
+                for (side, beyond) in uncertain.sides.into_iter().zip([d, h, d]) {
                     prop_assert!(is_doubtful(side) || robust_in_circle(a, b, c, beyond) < 0);
                 }
                 // What comes after the last triangle is not in doubt.
-                let all = doubts.sides.iter().fold(doubts.orientation, |all, side| all | side);
+                let all = uncertain.sides.iter().fold(uncertain.orientation, |all, side| all | side);
                 prop_assert_eq!(u128::from(all) >> (place + 1), 0);
             }
         }

@@ -22,7 +22,7 @@
 //! tie rule says) it is then the canonical Delaunay triangulation.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::{Doubts, orient2d};
+use crate::geometry::predicates::{Uncertain, orient2d};
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::index::{HalfEdgeIndex, SiteIndex};
 use crate::voronoi::closed_mesh::ClosedMesh;
@@ -123,14 +123,14 @@ impl AcceptanceCheck {
 
     /// Decides points 1 and 5 exactly where a block from record `first` on is in doubt.
     #[cold]
-    fn decide(closed: &ClosedMesh, sites: &[Site], first: usize, doubts: Doubts) -> Result<(), Rejection> {
-        if sides(doubts.orientation, first, 0).any(|t| {
+    fn decide(closed: &ClosedMesh, sites: &[Site], first: usize, uncertain: Uncertain) -> Result<(), Rejection> {
+        if sides(uncertain.orientation, first, 0).any(|t| {
             let [a, b, c] = closed.triangle_sites(sites, t);
             orient2d(a, b, c) <= 0
         }) {
             return Err(Rejection::NotAccepted("a triangle is not counterclockwise"));
         }
-        for (i, side) in doubts.sides.into_iter().enumerate() {
+        for (i, side) in uncertain.sides.into_iter().enumerate() {
             if sides(side, first, i).any(|h| closed.fails(sites, h)) {
                 return Err(Rejection::NotAccepted("an edge is not Delaunay"));
             }
@@ -197,8 +197,8 @@ fn check_blocks(
         if tested.broken {
             return Err(Rejection::NotAccepted("twins do not fit"));
         }
-        if tested.doubts != Doubts::default() {
-            AcceptanceCheck::decide(closed, sites, first, tested.doubts)?;
+        if tested.uncertain != Uncertain::default() {
+            AcceptanceCheck::decide(closed, sites, first, tested.uncertain)?;
         }
         links += tested.edges;
         check.write_twins(&block.records[..block.count], 8 * front as u32, &mut mesh.twins[3 * (first - front)..]);

@@ -55,10 +55,11 @@ impl ShiftRepair {
             for (t, [a, b, c, ..]) in block.records.iter().enumerate() {
                 self.tester.set_corners(t, [sites[*a as usize], sites[*b as usize], sites[*c as usize]]);
             }
-            let doubts = self.tester.test::<false>(records, mesh.front().get() / 8, first, &block, sites).doubts;
+            let uncertain = self.tester.test::<false>(records, mesh.front().get() / 8, first, &block, sites).uncertain;
             // The scan leaves no record free.
-            self.inverted.extend(tested_sides(doubts.orientation, first, 0).filter(|&t| is_inverted(mesh, sites, t)));
-            for (i, side) in doubts.sides.into_iter().enumerate() {
+            self.inverted
+                .extend(tested_sides(uncertain.orientation, first, 0).filter(|&t| is_inverted(mesh, sites, t)));
+            for (i, side) in uncertain.sides.into_iter().enumerate() {
                 suspects.extend(tested_sides(side, first, i));
             }
             first += block.count;

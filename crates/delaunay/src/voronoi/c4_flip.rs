@@ -1,7 +1,7 @@
 //! Step C4: flip edges until all are Delaunay (Lawson), by the canonical in-circle test.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::{failing_edge, four_inside_or_in_doubt};
+use crate::geometry::predicates::{failing_edge, four_inside_or_uncertain};
 use crate::voronoi::closed_mesh::ClosedMesh;
 use crate::voronoi::index::ClosedEdge;
 use crate::voronoi::rejection::Rejection;
@@ -73,10 +73,10 @@ impl FlipQueue {
             mesh.site_beyond(sites, k),
             mesh.site_beyond(sites, l),
         ];
-        let doubtful = four_inside_or_in_doubt([t, t, u, u], beyond);
+        let uncertain = four_inside_or_uncertain([t, t, u, u], beyond);
         let mut found = [ClosedEdge::default(); 4];
         let mut count = 0;
-        for (side, doubt) in outline.into_iter().zip(doubtful) {
+        for (side, doubt) in outline.into_iter().zip(uncertain) {
             found[count % 4] = side;
             count += doubt as usize;
         }

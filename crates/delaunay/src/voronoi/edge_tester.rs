@@ -3,7 +3,7 @@
 //! The caller decides exactly what the bound leaves in doubt.
 
 use crate::geometry::Site;
-use crate::geometry::predicates::{Doubts, TriangleBatch};
+use crate::geometry::predicates::{TriangleBatch, Uncertain};
 use crate::voronoi::index::ClosedEdge;
 
 /// Tests a block of triangles at a time.
@@ -16,7 +16,7 @@ pub(super) struct EdgeTester {
 pub(super) struct TestedBlock {
     /// The triangles that may not be counterclockwise, and the edges that fail the in-circle test or may fail it. An edge belongs to the
     /// later of its triangles. The result for edges to infinity is arbitrary.
-    pub(super) doubts: Doubts,
+    pub(super) uncertain: Uncertain,
     /// The number of edges.
     pub(super) edges: usize,
     /// Whether some half-edge and its twin are not each other's twins or have different ends.
@@ -51,11 +51,11 @@ impl EdgeTester {
             broken |= self.fetch_beyond::<CHECK>(records, first, block.records, i, own, sites);
             edges += own.count_ones() as usize;
         }
-        let mut doubts = self.batch.doubts(block.count);
-        for (side, own) in doubts.sides.iter_mut().zip(own) {
+        let mut uncertain = self.batch.uncertain(block.count);
+        for (side, own) in uncertain.sides.iter_mut().zip(own) {
             *side &= own;
         }
-        TestedBlock { doubts, edges, broken }
+        TestedBlock { uncertain, edges, broken }
     }
 
     /// Fetches the sites beyond side `i` of the triangles `own`. With `CHECK`, returns whether some link is wrong.

@@ -149,7 +149,7 @@ impl JobDirectory {
     ///
     /// # Errors
     /// [`Error::Io`] if the folder cannot be listed.
-    pub fn look(&self) -> Result<()> {
+    pub fn probe(&self) -> Result<()> {
         entries(&self.job).map(|_| ())
     }
 

@@ -1,4 +1,4 @@
-//! The store: what steps leave for later steps, one record for each result, in a few files that only grow, until the room of records
+//! The store: what steps leave for later steps, one record for each result, in a few files that only grow, until the space of records
 //! that no step needs any more is given back to the disk.
 //!
 //! Not one file for each result: creating and removing thousands of small files takes a large part of a job's time on common file
@@ -206,7 +206,7 @@ impl<K: RecordKey> Store<K> {
         Ok(values)
     }
 
-    /// Gives the room of the record of `key` back to the disk. From then on there is no such record.
+    /// Gives the space of the record of `key` back to the disk. From then on there is no such record.
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.

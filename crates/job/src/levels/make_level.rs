@@ -44,7 +44,7 @@ impl AddAssign for LevelStats {
 }
 
 /// Where the coarser tiles of a job are made.
-pub struct LevelRoom<'a> {
+pub struct LevelContext<'a> {
     /// Holds the tiles, finer and coarser.
     pub directory: &'a JobDirectory,
     /// Holds what `tileset.json` says of them.
@@ -86,26 +86,26 @@ fn seen_error(simple: &Simplified, frame: &Frame, bounds: Bounds<3>) -> f64 {
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the store, [`Error::Broken`] if a file is not what an earlier step wrote.
-pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStats>> {
-    let coarse = &room.hierarchy.tiles[index];
-    let children = coarse.children.iter().map(|&child| Child::find(room, child)).collect::<Result<Vec<_>>>()?;
+pub fn make_level(context: &LevelContext, index: usize) -> Result<StepOutput<LevelStats>> {
+    let coarse = &context.hierarchy.tiles[index];
+    let children = coarse.children.iter().map(|&child| Child::find(context, child)).collect::<Result<Vec<_>>>()?;
     let bounds = children.iter().filter_map(|child| child.own.bounds()).reduce(Bounds::union);
     let (mut stats, mut files) = (LevelStats::default(), Vec::new());
     let mut own = TileSummary::new(bounds, 0);
-    if let (true, Some(bounds)) = (room.meshes, bounds) {
-        match memory_for(&children).filter(|bytes| *bytes <= room.sizes.memory) {
+    if let (true, Some(bounds)) = (context.meshes, bounds) {
+        match memory_for(&children).filter(|bytes| *bytes <= context.sizes.memory) {
             None => stats.left_out = 1,
             Some(_) => {
-                let (tile, simple) = simplified(room, coarse.node, &children)?;
+                let (tile, simple) = simplified(context, coarse.node, &children)?;
                 let of_children =
                     |error: fn(&TileSummary) -> f64| children.iter().map(|c| error(&c.own)).fold(0.0, f64::max);
                 // No distance is greater than the range of heights: both meshes lie within it.
                 let greatest = of_children(|own| own.greatest_error) + simple.greatest_error;
-                own.greatest_error = greatest.min(height_range(&room.style.frame, bounds));
-                own.error = seen_error(&simple, &room.style.frame, bounds).max(of_children(|own| own.error));
+                own.greatest_error = greatest.min(height_range(&context.style.frame, bounds));
+                own.error = seen_error(&simple, &context.style.frame, bounds).max(of_children(|own| own.error));
                 own.vertices = tile.positions.len() as u32;
-                let path = room.directory.output().level(room.part.node_number(coarse.node));
-                let written = write_glb(&path, &tile, room.style)?;
+                let path = context.directory.output().level(context.part.node_number(coarse.node));
+                let written = write_glb(&path, &tile, context.style)?;
                 let triangles = tile.triangles.len() as u64;
                 stats =
                     LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.greatest_error, left_out: 0 };
@@ -114,7 +114,7 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
         }
     }
     let leaves = children.iter().filter(|child| child.exact).map(|child| child.own).collect();
-    let record = LevelSummary { own, leaves }.save(room.store, coarse.node)?;
+    let record = LevelSummary { own, leaves }.save(context.store, coarse.node)?;
     Ok(StepOutput { files, ..StepOutput::new(stats, vec![record]) })
 }
 
@@ -122,10 +122,10 @@ pub fn make_level(room: &LevelRoom, index: usize) -> Result<StepOutput<LevelStat
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on the store.
-pub fn level_memory(room: &LevelRoom, index: usize) -> Result<u64> {
-    let children = room.hierarchy.tiles[index].children.iter().map(|&child| Child::find(room, child));
+pub fn level_memory(context: &LevelContext, index: usize) -> Result<u64> {
+    let children = context.hierarchy.tiles[index].children.iter().map(|&child| Child::find(context, child));
     let needed = memory_for(&children.collect::<Result<Vec<_>>>()?);
-    Ok(needed.filter(|bytes| *bytes <= room.sizes.memory).unwrap_or(0))
+    Ok(needed.filter(|bytes| *bytes <= context.sizes.memory).unwrap_or(0))
 }
 
 /// Returns the bytes of memory that joining and simplifying `children` takes; `None` if one of them has been left out.
@@ -136,16 +136,16 @@ fn memory_for(children: &[Child]) -> Option<u64> {
 }
 
 /// Joins and simplifies the meshes of `children`, the tiles below `node`. Returns the coarser tile and what is known of it.
-fn simplified(room: &LevelRoom, node: NodeIndex, children: &[Child]) -> Result<(Tile, Simplified)> {
+fn simplified(context: &LevelContext, node: NodeIndex, children: &[Child]) -> Result<(Tile, Simplified)> {
     let vertices = children.iter().map(|child| child.own.vertices as usize).sum();
-    let mut joining = Joining::new(&room.style.frame, vertices);
+    let mut joining = Joining::new(&context.style.frame, vertices);
     for child in children.iter().filter(|child| child.own.vertices > 0) {
         joining.add(read_own(&child.path)?).map_err(|what| contradiction(node, &what))?;
     }
     let joined = joining.finish();
     let terrain = joined.terrain();
-    let target = room.sizes.target(terrain.triangles.len());
-    let mut simple = simplify(&room.style.frame, &terrain, target, room.style.lines.as_deref())?;
+    let target = context.sizes.target(terrain.triangles.len());
+    let mut simple = simplify(&context.style.frame, &terrain, target, context.style.lines.as_deref())?;
     let mesh = std::mem::take(&mut simple.mesh);
     Ok((joined.tile(mesh), simple))
 }
@@ -170,19 +170,19 @@ pub struct Child {
 }
 
 impl Child {
-    fn find(room: &LevelRoom, child: ChildTile) -> Result<Child> {
-        let output = room.directory.output();
+    fn find(context: &LevelContext, child: ChildTile) -> Result<Child> {
+        let output = context.directory.output();
         match child {
             ChildTile::Exact(tile) => {
-                let own = TileSummary::load(room.store, tile)?;
+                let own = TileSummary::load(context.store, tile)?;
                 Ok(Child { own, exact: true, path: output.tile(tile.number()) })
             }
             ChildTile::Coarse(index) => {
-                let node = room.hierarchy.tiles[index].node;
-                let own = LevelSummary::load(room.store, node)?.own;
-                Ok(Child { own, exact: false, path: output.level(room.part.node_number(node)) })
+                let node = context.hierarchy.tiles[index].node;
+                let own = LevelSummary::load(context.store, node)?.own;
+                Ok(Child { own, exact: false, path: output.level(context.part.node_number(node)) })
             }
-            ChildTile::Part(part) => (room.top_of)(part),
+            ChildTile::Part(part) => (context.top_of)(part),
         }
     }
 

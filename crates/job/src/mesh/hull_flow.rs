@@ -70,7 +70,7 @@ enum Step {
 }
 
 /// Follows ways over the ground of a node.
-struct Ways<'a> {
+struct Routes<'a> {
     node: &'a NodeMesh<'a>,
     /// The long edges of the node's boundary.
     boundary: HashMap<HalfEdgeIndex, u32>,
@@ -87,7 +87,7 @@ struct Ways<'a> {
 /// # Errors
 /// [`Error::Broken`] if the mesh is not Delaunay.
 pub(crate) fn flows_of_leaf(node: &NodeMesh, tile: TileIndex) -> Result<NodeFlows> {
-    let mut ways = Ways::new(node, &FlowsBelow::default());
+    let mut ways = Routes::new(node, &FlowsBelow::default());
     let mut flows = NodeFlows { passes: ways.passes_up()?, ..NodeFlows::default() };
     // A way that leaves the tile does so at its boundary, so only triangles there need be asked for.
     let mut last: Vec<HalfEdgeIndex> = match node.is_root {
@@ -111,7 +111,7 @@ pub(crate) fn flows_of_merge(
     below: &FlowsBelow,
     tiles_of: impl Fn([SiteIndex; 3]) -> [TileIndex; 3],
 ) -> Result<NodeFlows> {
-    let mut ways = Ways::new(node, below);
+    let mut ways = Routes::new(node, below);
     let mut flows = NodeFlows { passes: ways.passes_up()?, ..NodeFlows::default() };
     for question in &below.questions {
         let h = ways.below.get(question.exit as usize).copied().flatten().ok_or_else(contradiction)?;
@@ -186,14 +186,14 @@ impl NodeMesh<'_> {
     }
 }
 
-impl<'a> Ways<'a> {
-    fn new(node: &'a NodeMesh<'a>, below: &FlowsBelow) -> Ways<'a> {
+impl<'a> Routes<'a> {
+    fn new(node: &'a NodeMesh<'a>, below: &FlowsBelow) -> Routes<'a> {
         let edges = (0..).zip(&node.found.boundary_edges).filter(|(_, h)| node.is_long(**h));
         let boundary = edges.map(|(at, &h)| (h, at)).collect();
         let found = find_edges(node, &below.boundary);
         let pass = |&[from, to]: &[u32; 2]| Some(((*found.get(from as usize)?)?, (*found.get(to as usize)?)?));
         let passes = below.passes.iter().filter_map(pass).collect();
-        Ways { node, boundary, below: found, passes, known: HashMap::new() }
+        Routes { node, boundary, below: found, passes, known: HashMap::new() }
     }
 
     /// Returns where the way leads that leaves over `h`.

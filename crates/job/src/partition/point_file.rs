@@ -147,7 +147,7 @@ impl PointFile {
         Ok(PointBlock { at, hash: xxh3_64(&packed), bytes, points: points.len() as u16, file })
     }
 
-    /// Gives the room of `blocks` of this file back to the disk: all those of one or more buckets.
+    /// Gives the space of `blocks` of this file back to the disk: all those of one or more buckets.
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.

@@ -74,7 +74,7 @@ pub(crate) fn check_places(
         .filter(|(_, places)| !places.is_empty())
         .collect();
     warn_of_long_turns(&places, warnings);
-    let mut ways = Ways::default();
+    let mut ways = ToDegrees::default();
     let mut find = |others: Option<&Others>| -> Vec<(&Source, Outside)> {
         let found = places.iter().map(|(source, places)| (*source, outside(source, places, common, &mut ways, others)));
         found.filter_map(|(source, found)| Some((source, found?))).collect()
@@ -118,7 +118,7 @@ fn outside(
     source: &Source,
     places: &[[f64; 2]],
     common: &CommonPlace,
-    ways: &mut Ways,
+    ways: &mut ToDegrees,
     others: Option<&Others>,
 ) -> Option<Outside> {
     let of = |said: SaidSystem| Outside::of(&said, ways.of(&said.crs)?, &said.own(places)?, others);
@@ -247,9 +247,9 @@ fn places(source: &Source, claim: &Option<SourceBox>, common: &CommonPlace) -> V
 
 /// The ways to longitude and latitude of systems that sources have in common. One that is not computed has none.
 #[derive(Default)]
-struct Ways(HashMap<String, Option<(AreaOfUse, CrsTransform)>>);
+struct ToDegrees(HashMap<String, Option<(AreaOfUse, CrsTransform)>>);
 
-impl Ways {
+impl ToDegrees {
     fn of(&mut self, crs: &Crs) -> Option<&(AreaOfUse, CrsTransform)> {
         let way = || Some((AreaOfUse::of(crs)?, CrsTransform::to_rough_degrees(crs).ok()?));
         self.0.entry(format!("{crs:?}")).or_insert_with(way).as_ref()

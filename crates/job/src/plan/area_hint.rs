@@ -5,7 +5,7 @@ use crate::plan::extent::Extent;
 use crate::plan::far_points::is_finer;
 use crate::plan::height_range::HeightSample;
 use crate::plan::job_plan::Plan;
-use crate::plan::lattice_choice::{LatticeWish, fineness};
+use crate::plan::lattice_choice::{LatticeRequest, fineness};
 use crate::plan::stretch::{Hint, stretch_hint};
 use delaunay::geometry::Bounds;
 use lattice::Lattice;
@@ -23,7 +23,7 @@ pub(crate) struct AreaHint<'a> {
     /// The lattice box of the extent.
     pub(crate) clipped: Bounds<2>,
     pub(crate) lattice: &'a Lattice,
-    pub(crate) wish: &'a LatticeWish,
+    pub(crate) wish: &'a LatticeRequest,
 }
 
 impl AreaHint<'_> {

@@ -10,21 +10,21 @@ use sys::{Error, Result, Warnings};
 const FEET_APART: f64 = 1e-5;
 
 /// A source and what it says of its coordinates, as far as `[input] unit` does not overrule it.
-struct Said<'a> {
+struct StatedCrs<'a> {
     source: &'a Source,
     crs: Cow<'a, Crs>,
 }
 
-impl Said<'_> {
+impl StatedCrs<'_> {
     /// `[input] unit` says what the columns of a text are in: x and y, and heights in the same unit.
-    fn of(source: &Source, unit: UnitChoice) -> Said<'_> {
+    fn of(source: &Source, unit: UnitChoice) -> StatedCrs<'_> {
         let (chosen, named) = (unit.unit(), source.crs.horizontal.metres_per_unit());
         if source.format != FileFormat::Text || chosen == Unit::Unknown {
-            return Said { source, crs: Cow::Borrowed(&source.crs) };
+            return StatedCrs { source, crs: Cow::Borrowed(&source.crs) };
         }
         let is_followed = |z: f64| Some(z) == named || are_feet(Unit::from_metres(Some(z)), chosen);
         let vertical = source.crs.vertical.filter(|z| !is_followed(*z));
-        Said { source, crs: Cow::Owned(Crs { horizontal: Unit::Unknown, vertical, ..source.crs.clone() }) }
+        StatedCrs { source, crs: Cow::Owned(Crs { horizontal: Unit::Unknown, vertical, ..source.crs.clone() }) }
     }
 
     fn is_text(&self) -> bool {
@@ -38,7 +38,7 @@ impl Said<'_> {
 /// [`Error::Config`] if two sources differ, or cannot be compared, and the user does not say which CRS to take.
 pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warnings: &mut Warnings) -> Result<Crs> {
     warn_of_other_units(sources, choice, unit.unit(), warnings);
-    let said: Vec<Said> = sources.iter().map(|source| Said::of(source, unit)).collect();
+    let said: Vec<StatedCrs> = sources.iter().map(|source| StatedCrs::of(source, unit)).collect();
     let mut crs = match choice {
         CrsChoice::Auto => {
             let crs = agreed(&said, unit, warnings)?;
@@ -50,7 +50,7 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warn
             said.iter().find(|s| s.crs.is_named()).map(|s| s.crs.clone().into_owned()).unwrap_or_default()
         }
         CrsChoice::Given { crs, .. } => {
-            let doubts = crs.doubts().into_iter().chain(crs.depths());
+            let doubts = crs.problems().into_iter().chain(crs.depths());
             doubts.for_each(|doubt| warnings.push(format!("[input] crs ({}): {doubt}", crs.label())));
             (**crs).clone()
         }
@@ -63,7 +63,7 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warn
     if *choice == CrsChoice::None {
         return Ok(crs);
     }
-    let overruled: Vec<(&Said, Vec<String>)> =
+    let overruled: Vec<(&StatedCrs, Vec<String>)> =
         said.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
     if let Some((first, differences)) = overruled.first() {
         warnings.push(format!(
@@ -84,11 +84,11 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warn
 ///
 /// # Errors
 /// [`Error::Config`] if the files differ, unless the user wants what the first of them says.
-fn add_units(crs: &mut Crs, said: &[Said], choice: &CrsChoice, warnings: &mut Warnings) -> Result<()> {
-    let counts = |s: &&Said| *choice != CrsChoice::None || s.is_text();
+fn add_units(crs: &mut Crs, said: &[StatedCrs], choice: &CrsChoice, warnings: &mut Warnings) -> Result<()> {
+    let counts = |s: &&StatedCrs| *choice != CrsChoice::None || s.is_text();
     let is_first = *choice == CrsChoice::First;
     if crs.horizontal == Unit::Unknown {
-        let length = |s: &Said| s.crs.metres_per_unit();
+        let length = |s: &StatedCrs| s.crs.metres_per_unit();
         if let Some((_, metres)) = one_of(said.iter().filter(counts), length, "x and y", is_first)? {
             crs.horizontal = Unit::from_metres(Some(metres));
         }
@@ -112,11 +112,11 @@ fn add_units(crs: &mut Crs, said: &[Said], choice: &CrsChoice, warnings: &mut Wa
 
 /// Returns the length that the sources say, and the first that says it.
 fn one_of<'a>(
-    said: impl Iterator<Item = &'a Said<'a>>,
-    length: impl Fn(&Said) -> Option<f64>,
+    said: impl Iterator<Item = &'a StatedCrs<'a>>,
+    length: impl Fn(&StatedCrs) -> Option<f64>,
     what: &str,
     is_first: bool,
-) -> Result<Option<(&'a Said<'a>, f64)>> {
+) -> Result<Option<(&'a StatedCrs<'a>, f64)>> {
     let mut lengths = said.filter_map(|s| Some((s, length(s)?)));
     let Some((first, metres)) = lengths.next() else { return Ok(None) };
     let differs = |other: f64| (other - metres).abs() > 1e-8 * metres;
@@ -134,7 +134,7 @@ fn one_of<'a>(
 }
 
 /// Returns the CRS that all sources agree on.
-fn agreed(said: &[Said], unit: UnitChoice, warnings: &mut Warnings) -> Result<Crs> {
+fn agreed(said: &[StatedCrs], unit: UnitChoice, warnings: &mut Warnings) -> Result<Crs> {
     let distinct = DistinctCrs::of(said.iter().map(|s| &*s.crs));
     if let Some((own, other, differences)) = distinct.contradiction()? {
         return Err(two_systems(&said[own], &said[other], &differences));
@@ -175,8 +175,8 @@ fn warn_of_datums(without: Vec<&Source>, count: usize, datum: &str, warnings: &m
     }
 }
 
-fn two_systems(own: &Said, other: &Said, differences: &[String]) -> Error {
-    let is_in = |said: &Said| {
+fn two_systems(own: &StatedCrs, other: &StatedCrs, differences: &[String]) -> Error {
+    let is_in = |said: &StatedCrs| {
         let crs = &said.crs;
         let path = said.source.path.display();
         if crs.is_named() {
@@ -209,9 +209,9 @@ fn two_systems(own: &Said, other: &Said, differences: &[String]) -> Error {
 }
 
 /// Warns about sources that say less than `crs`, which the others say.
-fn warn_of_gaps(said: &[Said], crs: &Crs, unit: UnitChoice, warnings: &mut Warnings) {
+fn warn_of_gaps(said: &[StatedCrs], crs: &Crs, unit: UnitChoice, warnings: &mut Warnings) {
     let count = said.len();
-    let nameless: Vec<&Said> = said.iter().filter(|s| !s.crs.is_named()).collect();
+    let nameless: Vec<&StatedCrs> = said.iter().filter(|s| !s.crs.is_named()).collect();
     if let (true, Some(first)) = (crs.is_named(), nameless.first()) {
         warnings.push(format!(
             "{} of {count} inputs name no CRS, such as {}: they are taken to be in {}, as the others are",
@@ -221,8 +221,8 @@ fn warn_of_gaps(said: &[Said], crs: &Crs, unit: UnitChoice, warnings: &mut Warni
         ));
     }
     // Of those without a CRS beside a CRS it has been said.
-    let lacks_unit = |s: &&Said| s.crs.horizontal == Unit::Unknown && (s.crs.is_named() || !crs.is_named());
-    let without: Vec<&Said> = said.iter().filter(lacks_unit).collect();
+    let lacks_unit = |s: &&StatedCrs| s.crs.horizontal == Unit::Unknown && (s.crs.is_named() || !crs.is_named());
+    let without: Vec<&StatedCrs> = said.iter().filter(lacks_unit).collect();
     if let (UnitChoice::Auto, Some(_), Some(first)) = (unit, crs.metres_per_unit(), without.first()) {
         warnings.push(format!(
             "{} of {count} inputs do not say the unit of their coordinates, such as {}: it is taken to be {}, as in the others",
@@ -233,7 +233,7 @@ fn warn_of_gaps(said: &[Said], crs: &Crs, unit: UnitChoice, warnings: &mut Warni
     }
     // Without a unit of height, heights are in the unit of x and y.
     let Some(metres) = crs.vertical.filter(|metres| crs.metres_per_unit() != Some(*metres)) else { return };
-    let silent: Vec<&Said> = said.iter().filter(|s| s.crs.vertical.is_none()).collect();
+    let silent: Vec<&StatedCrs> = said.iter().filter(|s| s.crs.vertical.is_none()).collect();
     if let Some(first) = silent.first() {
         warnings.push(format!(
             "{} of {count} inputs do not say the unit of their heights, such as {}: it is taken to be {}, as in the others",
@@ -246,16 +246,16 @@ fn warn_of_gaps(said: &[Said], crs: &Crs, unit: UnitChoice, warnings: &mut Warni
 
 /// Warns about files whose heights count downwards, and about those that do not say which way theirs count beside them. What the user
 /// says of the CRS is no news to the user.
-fn warn_of_depths(said: &[Said], crs: &Crs, warnings: &mut Warnings) {
+fn warn_of_depths(said: &[StatedCrs], crs: &Crs, warnings: &mut Warnings) {
     let count = said.len();
-    let downward: Vec<(&Said, String)> = said.iter().filter_map(|s| Some((s, s.crs.depths()?))).collect();
+    let downward: Vec<(&StatedCrs, String)> = said.iter().filter_map(|s| Some((s, s.crs.depths()?))).collect();
     let Some((first, doubt)) = downward.first() else { return };
     warnings.push(format!(
         "{}{}: {doubt} (set [input] crs to say what is meant)",
         if count == 1 { String::new() } else { format!("{} of {count} inputs, such as ", downward.len()) },
         first.source.path.display()
     ));
-    let silent: Vec<&Said> = said.iter().filter(|s| s.crs.vertical_system.is_none()).collect();
+    let silent: Vec<&StatedCrs> = said.iter().filter(|s| s.crs.vertical_system.is_none()).collect();
     if let (Some(_), Some(first)) = (crs.depths(), silent.first()) {
         warnings.push(format!(
             "{} of {count} inputs do not say whether their z counts downwards, such as {}: it is taken to count as in the others",

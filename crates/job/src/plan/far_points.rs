@@ -3,7 +3,7 @@
 
 use crate::options::JobOptions;
 use crate::plan::extent::{Extent, SourceBox, to_float};
-use crate::plan::lattice_choice::{LatticeWish, fineness};
+use crate::plan::lattice_choice::{LatticeRequest, fineness};
 use crate::plan::point_survey::PointSurvey;
 use crate::plan::rounded_box::{rounded, rounded_heights};
 use crate::plan::text_inputs::row_choice;
@@ -18,7 +18,7 @@ use tiles::frame::Frame;
 pub(crate) fn extent_without_outliers(
     sources: &mut [Source],
     options: &JobOptions,
-    wish: &LatticeWish,
+    wish: &LatticeRequest,
 ) -> Result<Extent> {
     sources.iter_mut().for_each(Source::keep_outliers);
     let all = Extent::of(sources, &options.input, wish.metres[0])?;
@@ -90,7 +90,7 @@ fn with_outliers(sources: &[Source], claimed: &Extent, options: &InputOptions) -
 }
 
 /// Tells whether the first of two extents allows finer steps than the second.
-pub(crate) fn is_finer(sources: &[Source], wish: &LatticeWish, [a, b]: [&Extent; 2]) -> bool {
+pub(crate) fn is_finer(sources: &[Source], wish: &LatticeRequest, [a, b]: [&Extent; 2]) -> bool {
     let [a, b] = [a, b].map(|extent| coarsenings(sources, wish, extent));
     (0..2).any(|axes| a[axes] < b[axes])
 }
@@ -127,7 +127,7 @@ const MOST_POWERS: u32 = 28;
 
 /// Returns by how many powers of ten steps must be coarser than those of the inputs so that glTF holds a triangle across all of `extent`:
 /// in x and y, and in z.
-fn coarsenings(sources: &[Source], wish: &LatticeWish, extent: &Extent) -> [u32; 2] {
+fn coarsenings(sources: &[Source], wish: &LatticeRequest, extent: &Extent) -> [u32; 2] {
     let finest = |axis: usize| sources.iter().map(|source| source.axes[axis].scale).min().unwrap_or(Decimal::ONE);
     let steps = [finest(0).min(finest(1)), finest(2)].map(to_float);
     let sizes = [extent.size(0).max(extent.size(1)), extent.size(2)];

@@ -1,8 +1,8 @@
 //! Points that all have one height: those of a map without heights, or of a text whose column of heights is another.
 
-use crate::plan::doubtful_heights::own_height;
 use crate::plan::extent::Extent;
 use crate::plan::height_range::HeightSample;
+use crate::plan::suspect_heights::own_height;
 use lattice::Lattice;
 use points::{FileFormat, Source};
 

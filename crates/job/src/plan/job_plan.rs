@@ -39,7 +39,7 @@ pub struct Plan {
     /// The box of the inputs on the lattice as their headers claim it, within `[input] bounds`.
     pub extent: Bounds<2>,
     /// What a job of several parts must know before all points are read; `None` for a job of one part.
-    pub claims: Option<Claims>,
+    pub claims: Option<HeaderClaims>,
     /// The heights that a ramp of colours spans, by a sample of the points. `None` if they are too few to tell: then the box of the points,
     /// or what is claimed of it, decides.
     pub heights: Option<HeightRange>,
@@ -93,17 +93,17 @@ pub(crate) fn decoded_records(source: &Source, rules: &PointRules) -> u64 {
 /// What headers and the first chunks of the inputs say of all points. All tiles have one style, so it cannot wait for the last point. If
 /// a point shows that a claim is wrong, the job starts again as one part.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct Claims {
+pub struct HeaderClaims {
     /// The lattice box of the points.
     pub bounds: Bounds<3>,
     /// The greatest red, green or blue. Only whether it exceeds 0, and 255, counts.
     pub max_rgb: u16,
 }
 
-impl Claims {
+impl HeaderClaims {
     /// Returns the claims with the sites of lines within `bounds`.
-    pub(crate) fn with_lines(self, bounds: Option<Bounds<3>>) -> Claims {
-        Claims { bounds: bounds.map_or(self.bounds, |bounds| bounds.union(self.bounds)), ..self }
+    pub(crate) fn with_lines(self, bounds: Option<Bounds<3>>) -> HeaderClaims {
+        HeaderClaims { bounds: bounds.map_or(self.bounds, |bounds| bounds.union(self.bounds)), ..self }
     }
 
     /// Tells whether points within `bounds`, of which `max_rgb` is the greatest colour, contradict the claims.

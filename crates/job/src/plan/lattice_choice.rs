@@ -26,7 +26,7 @@ pub struct LatticeCoarsening {
 }
 
 /// What a lattice is to be like.
-pub(crate) struct LatticeWish {
+pub(crate) struct LatticeRequest {
     /// The length of the unit of x and y, and of that of z.
     pub(crate) metres: [f64; 2],
     /// The step in x and y, and the step in z, that the user sets.
@@ -42,7 +42,7 @@ pub(crate) struct LatticeWish {
 pub(crate) fn choose_lattice(
     sources: &[Source],
     extent: &Extent,
-    wish: &LatticeWish,
+    wish: &LatticeRequest,
     warnings: &mut Warnings,
 ) -> Result<Lattice> {
     let horizontal = horizontal_step(sources, extent, wish)?;
@@ -93,7 +93,7 @@ const USELESS: f64 = 0.099;
 const COARSE: f64 = 0.0101;
 
 /// Returns how well a lattice can hold `extent`.
-pub(crate) fn fineness(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Fineness {
+pub(crate) fn fineness(sources: &[Source], extent: &Extent, wish: &LatticeRequest) -> Fineness {
     let steps = [horizontal_step(sources, extent, wish).ok(), vertical_step(sources, extent, wish).ok()];
     Fineness { steps, metres: wish.metres }
 }
@@ -174,7 +174,7 @@ const FINE_ENOUGH: f64 = 0.0099;
 /// Returns the step in x and y: the one that the user sets, or else the finest of the inputs with which a triangle across the whole
 /// extent can be written. A step of a centimetre or more is not coarsened for that reason; there the mesh itself decides
 /// ([`Error::TooFine`]).
-fn horizontal_step(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Result<ChosenStep> {
+fn horizontal_step(sources: &[Source], extent: &Extent, wish: &LatticeRequest) -> Result<ChosenStep> {
     let metres = wish.metres[0];
     let size = extent.size(0).max(extent.size(1));
     let farthest = extent.farthest(0).max(extent.farthest(1));
@@ -214,7 +214,7 @@ fn too_fine(step: Decimal, size: f64, farthest: f64) -> Error {
 
 /// Returns the step in z: the one that the user sets, or else the finest of the inputs with which all heights between the lowest and
 /// the highest can be written.
-fn vertical_step(sources: &[Source], extent: &Extent, wish: &LatticeWish) -> Result<ChosenStep> {
+fn vertical_step(sources: &[Source], extent: &Extent, wish: &LatticeRequest) -> Result<ChosenStep> {
     let metres = wish.metres[1];
     let fits = |step: Decimal| {
         extent.size(2) * metres < Frame::longest_at(to_float(step) * metres)

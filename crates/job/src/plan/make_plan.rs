@@ -7,17 +7,17 @@ use crate::plan::breaklines::line_files::LineFiles;
 use crate::plan::breaklines::{CloudOfPlan, PlannedBreaklines, SystemOfPoints};
 use crate::plan::budget::network_memory;
 use crate::plan::common_crs::{common_crs, horizontal_unit};
-use crate::plan::doubtful_heights::check_doubtful_heights;
 use crate::plan::extent::{Extent, SourceBox, to_float};
 use crate::plan::far_points::{extent_without_outliers, farthest_file};
 use crate::plan::flat_points::flat_points;
 use crate::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of_geocentric};
 use crate::plan::height_range::HeightSample;
 use crate::plan::inputs::{check_missing_records, open_all};
-use crate::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
-use crate::plan::lattice_choice::{LatticeCoarsening, LatticeWish, choose_lattice, fineness};
+use crate::plan::job_plan::{HeaderClaims, Plan, PlannedInput, SkippedInput, decoded_records};
+use crate::plan::lattice_choice::{LatticeCoarsening, LatticeRequest, choose_lattice, fineness};
 use crate::plan::other_unit::{refuse_other_unit, warn_of_dropped_units};
 use crate::plan::stray_heights::JobHeights;
+use crate::plan::suspect_heights::check_doubtful_heights;
 use crate::plan::text_inputs::{
     check_malformed_rows, check_malformed_sample, farthest_row, refuse_degrees, refuse_missing_classes,
     refuse_missing_returns, row_choice, wanted_fields,
@@ -27,7 +27,7 @@ use delaunay::geometry::Bounds;
 use delaunay::geometry::REACH;
 use lattice::{AxisMap, Lattice, shortest_decimal};
 use points::options::{OnBadFile, UnitChoice};
-use points::surface_doubts::no_ground;
+use points::surface_warnings::no_ground;
 use points::transform_sources::transform_sources;
 use points::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source, set_network_memory};
 use rayon::prelude::*;
@@ -149,7 +149,7 @@ fn try_plan(
     warn_of_geocentric(sources, &options.input, &mut warnings);
     warn_of_degrees(sources, &options.input, &mut warnings);
     warn_of_dropped_units(sources, &options.input, [metres, metres_z], &mut warnings);
-    let wish = LatticeWish {
+    let wish = LatticeRequest {
         metres: [metres, metres_z],
         steps: [options.input.resolution.step(), options.input.resolution_z.step()],
         coarsening,
@@ -276,7 +276,7 @@ fn claims(
     lattice: &Lattice,
     extent: &Extent,
     clipped: Bounds<2>,
-) -> Result<Claims> {
+) -> Result<HeaderClaims> {
     let [low, high] = claimed_heights(lattice, extent);
     let [low, high] = [low.floor() - 1.0, high.ceil() + 1.0].map(|z| z as i32);
     let bounds = Bounds {
@@ -291,7 +291,7 @@ fn claims(
         source.decode(chunks.chunk(0), rules, &mut |_| Ok(())).map(|counts| counts.max_rgb)
     };
     let max_rgb = sources.par_iter().zip(rules).map(first_colors).try_reduce(|| 0, |a, b| Ok(a.max(b)))?;
-    Ok(Claims { bounds, max_rgb })
+    Ok(HeaderClaims { bounds, max_rgb })
 }
 
 /// Returns a sentence about the files whose sample has no ground, if the job wants only that, and others have some.

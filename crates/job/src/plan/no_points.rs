@@ -5,7 +5,7 @@ use crate::plan::height_range::may_reach;
 use crate::plan::job_plan::Plan;
 use crate::plan::job_plan::decoded_records;
 use crate::plan::text_inputs::count;
-use points::surface_doubts::no_ground;
+use points::surface_warnings::no_ground;
 use points::{FileFormat, PointCounts, Source};
 use sys::{Error, Result};
 

@@ -2,12 +2,12 @@
 //! the first is, and which `[input] heights` leave them out.
 
 use crate::options::JobOptions;
-use crate::plan::doubtful_heights::{own_height, shown_own_height};
 use crate::plan::extent::{Extent, SourceBox, to_float};
 use crate::plan::height_groups::{FLAT, HIGH, HeightBins, HeightGroup, HeightsApart, LOW, TerrainScale, heights_apart};
 use crate::plan::height_range::HeightSample;
 use crate::plan::job_plan::{Plan, decoded_records};
 use crate::plan::rounded_box::rounded_heights;
+use crate::plan::suspect_heights::{own_height, shown_own_height};
 use delaunay::geometry::Bounds;
 use lattice::Lattice;
 use points::{FileFormat, KeptHeights, OptionalFields, PointRules, Source};

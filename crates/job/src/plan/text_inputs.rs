@@ -6,7 +6,7 @@ use crate::plan::height_range::HeightSample;
 use crate::plan::job_plan::Plan;
 use points::options::{InputOptions, OnBadFile, UnitChoice};
 use points::surface::Surface;
-use points::surface_doubts::no_column_of_classes;
+use points::surface_warnings::no_column_of_classes;
 use points::{
     CrsChoice, CrsKind, FileFormat, KeptReturns, OptionalFields, PointCounts, PointRules, RowChoice, Source,
     TextReading, Unit,

@@ -21,7 +21,7 @@ use crate::publish::raster::check::{check_raster, planned_raster};
 use crate::report::skipped_inputs::write_skipped;
 use points::Source;
 use points::surface::SurfaceShares;
-use points::surface_doubts::{no_ground, unclear_returns};
+use points::surface_warnings::{no_ground, unclear_returns};
 use points::transformation::{Transformation, transformations};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -105,14 +105,14 @@ pub struct Preflight {
 /// # Errors
 /// Every error that would stop the job before its first point; see [`make_plan`].
 pub fn check(options: &JobOptions) -> Result<Preflight> {
-    look(options).map(|(preflight, _)| preflight)
+    inspect(options).map(|(preflight, _)| preflight)
 }
 
 /// As [`check`]. Also returns the plan of the job.
 ///
 /// # Errors
 /// As [`check`].
-pub fn look(options: &JobOptions) -> Result<(Preflight, Plan)> {
+pub fn inspect(options: &JobOptions) -> Result<(Preflight, Plan)> {
     let directory = JobDirectory::new(&options.output.directory);
     check_nothing_in_the_way(&directory)?;
     check_results_are_ours(&directory, options.output.page)?;
@@ -122,7 +122,7 @@ pub fn look(options: &JobOptions) -> Result<(Preflight, Plan)> {
     check_raster(&plan)?;
     let threads = workers(options, plan.records)?;
     let mut preflight = if has_filter(&plan) {
-        closer_look(&plan, threads)?
+        inspect_closely(&plan, threads)?
     } else {
         Preflight::of(&plan, threads, KeptPoints::by_headers(&plan))
     };
@@ -137,17 +137,17 @@ pub fn look(options: &JobOptions) -> Result<(Preflight, Plan)> {
 ///
 /// # Errors
 /// As [`Preflight::passes`].
-pub(crate) fn require_room(plan: &Plan, threads: usize) -> Result<()> {
+pub(crate) fn require_memory_and_disk(plan: &Plan, threads: usize) -> Result<()> {
     let mut preflight = Preflight::of(plan, threads, KeptPoints::by_headers(plan));
     let memory_is_short = preflight.memory_free.is_some_and(|free| free < preflight.memory);
     if has_filter(plan) && (preflight.disk_is_short() || memory_is_short) {
-        preflight = closer_look(plan, threads)?;
+        preflight = inspect_closely(plan, threads)?;
     }
     preflight.passes()
 }
 
 /// Looks at as many points as it takes to know whether the disk suffices.
-fn closer_look(plan: &Plan, threads: usize) -> Result<Preflight> {
+fn inspect_closely(plan: &Plan, threads: usize) -> Result<Preflight> {
     let is_short = |kept| Preflight::of(plan, threads, kept).disk_is_short();
     let kept = KeptPoints::by_sample(plan, |least, most| is_short(least) || !is_short(most))?;
     Ok(Preflight::of(plan, threads, kept))

@@ -19,7 +19,7 @@ use lattice::Lattice;
 use lattice::VertexDigest;
 use points::options::InputOptions;
 use points::surface::SurfaceShares;
-use points::surface_doubts::unclear_returns;
+use points::surface_warnings::unclear_returns;
 use points::transformation::{Transformation, transformations};
 use points::{NetworkTraffic, PlausiblePoints, PointCounts, TextReading};
 use rust_decimal::prelude::ToPrimitive;

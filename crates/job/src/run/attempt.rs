@@ -13,14 +13,13 @@ use crate::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::plan::job_plan::Plan;
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::plan::make_plan::{are_there_far_points, make_plan};
-use crate::preflight::check::require_room;
+use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::{JobProgress, ProgressOutput};
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::raster::check::check_raster;
 use crate::report::job_report::Report;
-use crate::run::alone::Alone;
 use crate::run::damage::damaged_by_tasks;
 use crate::run::finished::{InPlace, known_submission, results_in_place};
 use crate::run::part_entries::StepsOfParts;
@@ -29,6 +28,7 @@ use crate::run::resume;
 use crate::run::resume::{EarlierRun, RunStart, place_results_of_finished_job};
 use crate::run::resume_parts::start_parts;
 use crate::run::run_context::RunContext;
+use crate::run::single_process::SingleProcess;
 use crate::run::stage_costs::stage_costs;
 use crate::run::temporary_bytes::TemporaryBytes;
 use delaunay_gpu::triangulator::Triangulator;
@@ -173,7 +173,7 @@ pub(crate) fn coarsening_of(
     let Some(mut known) = earlier.and_then(|earlier| earlier.coarsening(fingerprint)) else {
         return Ok(LatticeCoarsening::default());
     };
-    known.one_part |= Alone::find(directory, 0)? == Some(Alone::InOnePart);
+    known.one_part |= SingleProcess::find(directory, 0)? == Some(SingleProcess::AsOnePart);
     Ok(known)
 }
 
@@ -216,7 +216,7 @@ fn attempt(
     note_skipped(&plan.skipped, progress);
     let threads = workers(options, plan.records)?;
     if !run.force && job.work == EarlierWork::Interrupted {
-        on_threads(threads, || require_room(&plan, threads))?;
+        on_threads(threads, || require_memory_and_disk(&plan, threads))?;
     }
     check_results_are_ours(directory, options.output.page)?;
     let mut earlier = earlier;

@@ -9,7 +9,7 @@ use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::records::{JobStep, StepRecord};
 use crate::report::job_report::Report;
-use crate::run::alone::Alone;
+use crate::run::single_process::SingleProcess;
 use std::io::ErrorKind;
 use sys::threads::on_threads;
 use sys::{Error, Result, disk};
@@ -38,7 +38,7 @@ pub(crate) fn results_in_place(
     is_under_way: impl FnOnce() -> Result<bool>,
 ) -> Result<InPlace> {
     let waiting = directory.output().report();
-    if disk::exists(&waiting).map_err(Error::io("read", &waiting))? || Alone::find(directory, 0)?.is_some() {
+    if disk::exists(&waiting).map_err(Error::io("read", &waiting))? || SingleProcess::find(directory, 0)?.is_some() {
         return Ok(InPlace::Nothing);
     }
     let path = directory.results().report();
@@ -86,7 +86,7 @@ pub(crate) fn known_submission(directory: &JobDirectory) -> Result<u64> {
         text => serde_json::from_slice::<Report>(&text.map_err(Error::io("read", &path))?).ok(),
     };
     let of_report = report.map_or(0, |report| report.submission);
-    Ok(of_report.max(Alone::submission(directory)?))
+    Ok(of_report.max(SingleProcess::submission(directory)?))
 }
 
 /// Tells whether the job directory holds nothing but the rest of a finished job: neither a note nor the journal of a job that has not
@@ -99,7 +99,7 @@ pub(crate) fn is_rest(directory: &JobDirectory) -> Result<bool> {
         return Ok(false);
     }
     let journal = journal::read_steps::<JobHeader, JobStep, StepRecord>(directory, |step| step == JobStep::Report)?;
-    Ok(Alone::find(directory, 0)?.is_none() && journal.is_none_or(|(_, entries)| !entries.is_empty()))
+    Ok(SingleProcess::find(directory, 0)?.is_none() && journal.is_none_or(|(_, entries)| !entries.is_empty()))
 }
 
 /// Ends the removal of the rest of a finished job, if one is there.

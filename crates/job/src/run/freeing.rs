@@ -1,4 +1,4 @@
-//! Giving the room of what no step needs any more back to the disk while the job goes on: the points of a tile once it is
+//! Giving the space of what no step needs any more back to the disk while the job goes on: the points of a tile once it is
 //! triangulated, and what its leaf left once it is written.
 //!
 //! What takes their place must outlast a power failure first. So a thread waits until the journal and the store are on the disk, and
@@ -148,7 +148,7 @@ impl Drop for EndOfFreeing<'_> {
     }
 }
 
-/// Tells whether a part gives room back while it is done. A job of several parts cannot go on with another style anyway.
+/// Tells whether a part gives space back while it is done. A job of several parts cannot go on with another style anyway.
 pub(crate) fn frees(plan: &Plan, partition: &Partition) -> bool {
     !plan.is_one_part() || !plan.options.limits.keep_steps.keeps(partition.summary.counts.kept)
 }

@@ -2,7 +2,7 @@
 
 use crate::index::PartIndex;
 use crate::levels::hierarchy::{Hierarchy, LevelSizes};
-use crate::levels::make_level::{LevelRoom, LevelStats, TopOf, level_memory, make_level};
+use crate::levels::make_level::{LevelContext, LevelStats, TopOf, level_memory, make_level};
 use crate::partition::result::Partition;
 use crate::plan::job_plan::Plan;
 use crate::records::JobStep;
@@ -46,9 +46,10 @@ pub(crate) fn make_levels(
     let sizes = level_sizes(plan);
     let stage = run.progress.stage("levels", hierarchy.tiles.len() as u64, "tiles");
     let (directory, store) = (run.directory, run.store);
-    let room = LevelRoom { directory, store, hierarchy: &hierarchy, style, sizes, meshes: output.levels, part, top_of };
+    let context =
+        LevelContext { directory, store, hierarchy: &hierarchy, style, sizes, meshes: output.levels, part, top_of };
     let make = |index: usize| {
-        let stats = run.journal.step(JobStep::Level(hierarchy.tiles[index].node), || make_level(&room, index))?;
+        let stats = run.journal.step(JobStep::Level(hierarchy.tiles[index].node), || make_level(&context, index))?;
         stage.advance(1);
         Ok(stats)
     };
@@ -66,7 +67,8 @@ pub(crate) fn make_levels(
         }
         // A level reads the tiles below, which must have their names.
         run.journal.commit()?;
-        for (tiles, threads) in batches(&room, height, run.threads)?.into_iter().filter(|(tiles, _)| !tiles.is_empty())
+        for (tiles, threads) in
+            batches(&context, height, run.threads)?.into_iter().filter(|(tiles, _)| !tiles.is_empty())
         {
             // Threads keep the memory of the largest mesh that they have made, so each batch has its own.
             stats += on_threads(threads, || make_all(tiles))?;
@@ -78,11 +80,11 @@ pub(crate) fn make_levels(
 
 /// Divides coarser tiles into those that can be made on all `threads` at once and those that take more memory, each with the number of
 /// threads.
-fn batches(room: &LevelRoom, tiles: Vec<usize>, threads: usize) -> Result<[(Vec<usize>, usize); 2]> {
-    let each = room.sizes.memory / threads as u64;
+fn batches(context: &LevelContext, tiles: Vec<usize>, threads: usize) -> Result<[(Vec<usize>, usize); 2]> {
+    let each = context.sizes.memory / threads as u64;
     let (mut small, mut large, mut largest) = (Vec::new(), Vec::new(), 1);
     for tile in tiles {
-        match level_memory(room, tile)? {
+        match level_memory(context, tile)? {
             bytes if bytes <= each => small.push(tile),
             bytes => {
                 largest = largest.max(bytes);
@@ -90,7 +92,7 @@ fn batches(room: &LevelRoom, tiles: Vec<usize>, threads: usize) -> Result<[(Vec<
             }
         }
     }
-    Ok([(small, threads), (large, ((room.sizes.memory / largest) as usize).clamp(1, threads))])
+    Ok([(small, threads), (large, ((context.sizes.memory / largest) as usize).clamp(1, threads))])
 }
 
 /// Returns what the user should know about coarser tiles without a mesh.

@@ -12,10 +12,10 @@ use crate::preflight::kept_points::KeptPoints;
 use crate::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::records::{JobStep, Leaf};
 use crate::run::freeing::{Freeing, frees, while_freeing};
+use crate::run::postponed_merges::PostponedMerges;
 use crate::run::run_context::RunContext;
-use crate::run::tile_queue::{TileLook, TileQueue, WrittenTiles};
+use crate::run::tile_queue::{TileAppearance, TileQueue, WrittenTiles};
 use crate::run::tree_walk::TreeWalk;
-use crate::run::unmerged::Unmerged;
 use crate::tiles::max_edge::MaxEdgeRule;
 use delaunay::geometry::Bounds;
 use rayon::prelude::*;
@@ -35,9 +35,9 @@ pub(crate) struct MeshInTiles {
 /// When tiles may be written.
 pub(crate) enum Writing<'a> {
     /// As soon as they are finished.
-    AtOnce(Arc<TileLook>),
+    AtOnce(Arc<TileAppearance>),
     /// Once all leaves are done: then the number of sites tells how tiles look.
-    AfterLeaves(&'a (dyn Fn(u64) -> Result<Arc<TileLook>> + Sync)),
+    AfterLeaves(&'a (dyn Fn(u64) -> Result<Arc<TileAppearance>> + Sync)),
     /// Not before the whole job is triangulated.
     Later,
 }
@@ -52,14 +52,14 @@ pub(crate) fn mesh_and_tiles(
     partition: &Partition,
     bounds: Bounds<3>,
 ) -> Result<MeshInTiles> {
-    let look = |sites| {
+    let appearance = |sites| {
         let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
-        TileLook::new(plan, partition.summary.counts.max_rgb, bounds, max_edge).map(Arc::new)
+        TileAppearance::new(plan, partition.summary.counts.max_rgb, bounds, max_edge).map(Arc::new)
     };
     let writing = match may_write_at_once(plan, KeptPoints(partition.summary.counts.kept), frees(plan, partition)) {
         // The number of sites matters only to a rule for which the tiles have to wait.
-        true => Writing::AtOnce(look(0)?),
-        false => Writing::AfterLeaves(&look),
+        true => Writing::AtOnce(appearance(0)?),
+        false => Writing::AfterLeaves(&appearance),
     };
     let mesh = mesh_part(run, plan, partition, writing)?;
     match mesh.tiles.waiting.len() {
@@ -89,22 +89,22 @@ fn do_steps(
     let activity = run.progress.activity("triangulate", "points");
     let queue = TileQueue::new(run, partition, &stage, freeing);
     let points = open_points(run, partition)?;
-    let unmerged = Unmerged::default();
+    let unmerged = PostponedMerges::default();
     let walk =
         TreeWalk { run, plan, partition, points, stage: &stage, activity: &activity, queue: &queue, freeing, unmerged };
     let walked = rayon::scope(|scope| {
-        if let Writing::AtOnce(look) = &writing {
-            queue.begin(scope, look.clone());
+        if let Writing::AtOnce(appearance) = &writing {
+            queue.begin(scope, appearance.clone());
         }
         let leaves = walk.walk(scope, NodeIndex::ROOT)?;
         queue.attempt(|| walk.unmerged.check(&plan.options))?;
         let all_leaves = run.journal.position();
         // This closes the point files: an open file is not freed when it is removed.
         drop(walk);
-        if let Writing::AfterLeaves(look) = writing {
+        if let Writing::AfterLeaves(appearance) = writing {
             // Not while tiles are written: on a small disk the results need the room.
-            let look = || run_concurrently(|| run.remove_points(all_leaves), || look(leaves.sites));
-            queue.attempt(|| look().map(|look| queue.begin(scope, look)))?;
+            let appearance = || run_concurrently(|| run.remove_points(all_leaves), || appearance(leaves.sites));
+            queue.attempt(|| appearance().map(|appearance| queue.begin(scope, appearance)))?;
         }
         Some((leaves, all_leaves))
     });

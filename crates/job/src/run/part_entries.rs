@@ -35,14 +35,14 @@ pub(crate) fn entries_of_steps(
     wanted: impl Fn(JobStep) -> bool,
 ) -> Result<Vec<JournalEntry>> {
     // Another machine may have written it.
-    directory.look()?;
+    directory.probe()?;
     let read = journal::read_steps::<PartHeader, JobStep, StepRecord>(directory, wanted)?;
     let own = read.filter(|(found, _)| *found == Some(header));
     Ok(own.map(|(_, entries)| entries).unwrap_or_default())
 }
 
 fn entries_if(directory: &JobDirectory, is_wanted: impl Fn(PartHeader) -> bool) -> Result<Vec<JournalEntry>> {
-    directory.look()?;
+    directory.probe()?;
     let read = journal::read::<PartHeader, JobStep, StepRecord>(directory)?;
     let own = read.filter(|(found, _)| found.is_some_and(is_wanted));
     Ok(own.map(|(_, entries)| entries).unwrap_or_default())

@@ -18,7 +18,7 @@ use crate::report::job_report::{Report, ReportParts, SlowestPart};
 use crate::run::levels_step::left_out_warning;
 use crate::run::raster_step::write_raster;
 use crate::run::run_context::RunContext;
-use crate::run::tile_queue::TileLook;
+use crate::run::tile_queue::TileAppearance;
 use crate::tiles::style::TileStyle;
 use crate::tiles::write_tile::TileStats;
 use crs::geoid::Geoid;
@@ -139,16 +139,16 @@ pub(crate) fn publish(
     plan: &Plan,
     bounds: Bounds<3>,
     written: &WrittenFiles,
-    look: &TileLook,
+    appearance: &TileAppearance,
     tileset: Option<TilesetContent>,
 ) -> Result<Published> {
-    let raster = write_raster(run, plan, &look.style.frame, written.tiles)?;
+    let raster = write_raster(run, plan, &appearance.style.frame, written.tiles)?;
     let stage = run.progress.stage("publish", 1, "job");
     let output = &plan.options.output;
     let (mut warnings, mut text, mut placement, mut stats) = (Warnings::default(), None, None, LevelStats::default());
     if let Some(TilesetContent { mut root, levels }) = tileset {
         let geoid = Geoid::open(output.height_offset.as_ref())?;
-        let placed = match place(&plan.crs, &look.style.frame, geoid, &mut root) {
+        let placed = match place(&plan.crs, &appearance.style.frame, geoid, &mut root) {
             Err(NotPlaced::Height(error)) => return Err(error),
             placed => placed,
         };
@@ -158,7 +158,7 @@ pub(crate) fn publish(
         }
         warnings.extend(left_out_warning(plan, &levels));
         divide(&mut root);
-        text = Some((&look.style.frame, root));
+        text = Some((&appearance.style.frame, root));
         (placement, stats) = (placed.ok(), levels);
     }
     warnings.extend(hull_warning(plan, written.hull));
@@ -167,7 +167,7 @@ pub(crate) fn publish(
         raster.stats
     });
     let georeference =
-        Georeference::new(&look.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.undisputed_code());
+        Georeference::new(&appearance.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.undisputed_code());
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);
     let page_of_others = output.page && run.directory.has_page_of_others()?;
@@ -180,17 +180,17 @@ pub(crate) fn publish(
         georeference: georeference.to_json(placement.as_ref())?,
         tileset: text,
         one_file: fits && output.format != OutputFormat::Tiles3d,
-        flat: flat_scene(plan, &look.style, bounds),
+        flat: flat_scene(plan, &appearance.style, bounds),
         page: output.page && !page_of_others,
         copyright: output.copyright(),
-        has_ramp: matches!(look.style.coloring, None | Some(Coloring::Elevation(_))),
+        has_ramp: matches!(appearance.style.coloring, None | Some(Coloring::Elevation(_))),
         breaklines: lines.as_deref().map(|lines| (lines, &plan.lattice)),
     };
     if content.one_file {
         // terrain.glb is made from the tiles, which must have their names.
         run.journal.commit()?;
     }
-    let write = || write_side_files(run.directory, &content, &look.canvas, written.tiles);
+    let write = || write_side_files(run.directory, &content, &appearance.canvas, written.tiles);
     // The tiles reach the disk meanwhile, before the report says how long that took.
     let bytes = run_concurrently(|| run.journal.commit(), || run.journal.step(JobStep::Publish, write))?;
     if !fits && output.format == OutputFormat::Glb {

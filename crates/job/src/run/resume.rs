@@ -17,8 +17,8 @@ use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::progress::stage::{ProgressOutput, Stage};
 use crate::records::{JobStep, Journal, JournalEntry, Store};
 use crate::report::job_report::Report;
-use crate::run::alone::Alone;
 use crate::run::part_entries::{PartHeader, StepsOfParts, open_store, records_of};
+use crate::run::single_process::SingleProcess;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::io::{self, ErrorKind};
@@ -226,7 +226,7 @@ pub(crate) fn start<'a>(
     }
     directory.clear_parts()?;
     // A task that is killed finds its note again.
-    files.extend(Alone::notes(directory)?);
+    files.extend(SingleProcess::notes(directory)?);
     directory.clear(&files)?;
     let journal = Journal::begin(directory, &header, entries)?;
     Ok(RunStart { store: open_store(directory, &records)?, journal, partition, job_id: 0, resumed: 0 })

@@ -6,9 +6,9 @@ use crate::partition::result::Partition;
 use crate::plan::fingerprint::{JobChange, JobHeader};
 use crate::progress::stage::{JobProgress, ProgressOutput};
 use crate::records::{JobStep, Journal, JournalEntry};
-use crate::run::alone::Alone;
 use crate::run::part_entries::{forget_levels, open_store, records_of};
 use crate::run::resume::{EarlierRun, KeptSteps, ResumeReview, RunStart};
+use crate::run::single_process::SingleProcess;
 use std::time::SystemTime;
 use sys::Result;
 use tiles::options::MaxEdge;
@@ -43,7 +43,7 @@ pub(crate) fn start_parts<'a>(
         None => {
             remove_file(&directory.journal())?;
             directory.clear_parts()?;
-            directory.clear(&Alone::notes(directory)?)?;
+            directory.clear(&SingleProcess::notes(directory)?)?;
             (
                 Vec::new(),
                 JobHeader { id: new_id(), begun: header.begun.or(Some(SystemTime::now())), ..header.clone() },

@@ -33,7 +33,7 @@ pub(crate) struct TileQueue<'a> {
     border_normals: Activity,
     write: Activity,
     /// Set when tiles may be written.
-    look: OnceLock<Arc<TileLook>>,
+    appearance: OnceLock<Arc<TileAppearance>>,
     state: Mutex<QueueState>,
     has_failed: AtomicBool,
 }
@@ -52,7 +52,7 @@ struct QueueState {
 }
 
 /// How tiles look, and what they are drawn on.
-pub(crate) struct TileLook {
+pub(crate) struct TileAppearance {
     pub(crate) style: TileStyle,
     pub(crate) canvas: Canvas,
 }
@@ -60,7 +60,7 @@ pub(crate) struct TileLook {
 /// What became of the tiles of a part.
 pub(crate) struct WrittenTiles {
     /// How they look; `None` if none may be written yet.
-    pub(crate) look: Option<Arc<TileLook>>,
+    pub(crate) appearance: Option<Arc<TileAppearance>>,
     /// Totals over those that are written.
     pub(crate) stats: TileStats,
     /// Those that wait for other parts, ascending.
@@ -69,16 +69,16 @@ pub(crate) struct WrittenTiles {
     pub(crate) open: Vec<TileIndex>,
 }
 
-impl TileLook {
-    /// Returns the look of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`.
+impl TileAppearance {
+    /// Returns the appearance of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`.
     ///
     /// # Errors
     /// Those of [`TileStyle::new`].
-    pub(crate) fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> Result<TileLook> {
+    pub(crate) fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> Result<TileAppearance> {
         let heights = plan.heights.unwrap_or(HeightRange::of(bounds));
         let style = TileStyle::new(plan, max_rgb, bounds, heights, max_edge)?;
         let canvas = Canvas::new(&style.frame, bounds, heights);
-        Ok(TileLook { style, canvas })
+        Ok(TileAppearance { style, canvas })
     }
 }
 
@@ -105,17 +105,17 @@ impl<'a> TileQueue<'a> {
             freeing,
             border_normals: run.progress.activity("border normals", "tiles"),
             write: run.progress.activity("write", "points"),
-            look: OnceLock::new(),
+            appearance: OnceLock::new(),
             state: Mutex::new(state),
             has_failed: AtomicBool::new(false),
         }
     }
 
     /// Lets tiles be written from now on, beginning with those that are finished already.
-    pub(crate) fn begin<'s>(&'s self, scope: &Scope<'s>, look: Arc<TileLook>) {
+    pub(crate) fn begin<'s>(&'s self, scope: &Scope<'s>, appearance: Arc<TileAppearance>) {
         let mut state = self.state();
         // The lock is held here, so that no thread holds back a tile after these are taken.
-        self.look.get_or_init(|| look);
+        self.appearance.get_or_init(|| appearance);
         let held = std::mem::take(&mut state.held);
         drop(state);
         held.into_iter().for_each(|tile| self.start(scope, tile));
@@ -125,7 +125,7 @@ impl<'a> TileQueue<'a> {
     pub(crate) fn push<'s>(&'s self, scope: &Scope<'s>, tile: FinishedTile) {
         let mut state = self.state();
         state.finished[tile.tile.get()] = true;
-        if self.look.get().is_none() {
+        if self.appearance.get().is_none() {
             state.held.push(tile);
             return;
         }
@@ -161,7 +161,7 @@ impl<'a> TileQueue<'a> {
             left.map(|(tile, _)| tile).collect()
         };
         let (waiting, open) = (all_but(&state.written), all_but(&state.finished));
-        Ok(WrittenTiles { look: self.look.into_inner(), stats: state.stats, waiting, open })
+        Ok(WrittenTiles { appearance: self.appearance.into_inner(), stats: state.stats, waiting, open })
     }
 
     fn start<'s>(&'s self, scope: &Scope<'s>, tile: FinishedTile) {
@@ -177,7 +177,7 @@ impl<'a> TileQueue<'a> {
     /// Finishes the border normals of a tile and returns the tiles that can be written now.
     fn finish_border(&self, finished: FinishedTile) -> Result<Vec<FinishedTile>> {
         let RunContext { journal, store, .. } = *self.run;
-        let style = &self.look()?.style;
+        let style = &self.appearance()?.style;
         let tree = &self.partition.tree;
         let work = || finish_border_normals(store, tree, style, finished.tile, &seam_of(store, tree, finished)?);
         let step = JobStep::BorderNormals(finished.tile);
@@ -187,7 +187,7 @@ impl<'a> TileQueue<'a> {
 
     fn write(&self, finished: FinishedTile) -> Result<()> {
         let RunContext { journal, directory, store, .. } = *self.run;
-        let TileLook { style, canvas } = self.look()?;
+        let TileAppearance { style, canvas } = self.appearance()?;
         let seam = || seam_of(store, &self.partition.tree, finished);
         let border_of = |tile| FinishedBorder::load(store, tile);
         let work = || write_tile(directory, store, style, canvas, finished.tile, &seam()?, &border_of);
@@ -202,8 +202,11 @@ impl<'a> TileQueue<'a> {
         Ok(())
     }
 
-    fn look(&self) -> Result<&TileLook> {
-        self.look.get().map(|look| &**look).ok_or_else(|| Error::Broken("a tile is written too early".into()))
+    fn appearance(&self) -> Result<&TileAppearance> {
+        self.appearance
+            .get()
+            .map(|appearance| &**appearance)
+            .ok_or_else(|| Error::Broken("a tile is written too early".into()))
     }
 
     fn state(&self) -> MutexGuard<'_, QueueState> {

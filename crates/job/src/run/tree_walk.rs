@@ -13,10 +13,10 @@ use crate::progress::activity::Activity;
 use crate::progress::stage::Stage;
 use crate::records::{JobStep, StepOutput};
 use crate::run::freeing::Freeing;
+use crate::run::postponed_merges::PostponedMerges;
 use crate::run::run_context::RunContext;
 use crate::run::stage_costs::triangulated_share;
 use crate::run::tile_queue::TileQueue;
-use crate::run::unmerged::Unmerged;
 use crate::tiles::dependencies::FinishedTile;
 use rayon::Scope;
 use sys::{Error, Result};
@@ -35,7 +35,7 @@ pub(crate) struct TreeWalk<'a> {
     /// Takes the points that are not needed any more.
     pub(crate) freeing: &'a Freeing<'a>,
     /// Takes the nodes that do not fit the memory.
-    pub(crate) unmerged: Unmerged,
+    pub(crate) unmerged: PostponedMerges,
 }
 
 impl<'a> TreeWalk<'a> {

@@ -160,18 +160,18 @@ impl Lowest {
 
 /// A value that may stand for nodata, though it is none of the numbers that programs write for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DoubtfulHeight {
+pub struct SuspectHeight {
     /// The value, and who has it.
     pub height: SharedHeight,
     /// Where all other heights lie.
     pub others: [f64; 2],
 }
 
-impl DoubtfulHeight {
-    fn with_other_sign(self) -> DoubtfulHeight {
+impl SuspectHeight {
+    fn with_other_sign(self) -> SuspectHeight {
         let [low, high] = self.others;
         let height = SharedHeight { value: 0.0 - self.height.value, ..self.height };
-        DoubtfulHeight { height, others: [0.0 - high, 0.0 - low] }
+        SuspectHeight { height, others: [0.0 - high, 0.0 - low] }
     }
 }
 
@@ -258,7 +258,7 @@ impl Extremes {
     /// Returns the lowest or the highest value if several records share it, and nothing joins it to the other heights: it lies farther from
     /// them than they lie from each other, or, at their foot, much farther than the nearest of them do. It may stand for nodata, such as 0
     /// among mountains. A unit of heights is so many `metres`.
-    pub fn doubtful(&self, metres: f64) -> Option<DoubtfulHeight> {
+    pub fn doubtful(&self, metres: f64) -> Option<SuspectHeight> {
         let [few_low, few_high] = FEW;
         let [least_low, least_high] = [DOUBTFUL_LOW, DOUBTFUL_HIGH].map(|least| least / metres);
         let low = self.lowest.doubtful(&self.highest, few_low, |height, above, others| {
@@ -267,12 +267,12 @@ impl Extremes {
         let high = || {
             self.highest.doubtful(&self.lowest, few_high, |height, _, others| is_far(height.value, others, least_high))
         };
-        low.or_else(|| high().map(DoubtfulHeight::with_other_sign))
+        low.or_else(|| high().map(SuspectHeight::with_other_sign))
     }
 
     /// Returns the lowest value if several records share it, and it lies below all others by many times their range, or the lowest or the
     /// highest that few of all `records` share, and that lies apart. Nearer than a [`Extremes::doubtful`] one, it may be water, or a roof.
-    pub fn set_apart(&self, metres: f64, records: u64) -> Option<DoubtfulHeight> {
+    pub fn set_apart(&self, metres: f64, records: u64) -> Option<SuspectHeight> {
         let [usual_gap, tower] = [USUAL_GAP, TOWER].map(|gap| gap / metres);
         let is_usual = |height: &SharedHeight, value: f64, others: [f64; 2]| {
             is_usual_number(value) && height.is_set_apart(records, others, usual_gap, TIMES_OF_USUAL)
@@ -288,7 +288,7 @@ impl Extremes {
                     || height.is_set_apart(records, others, tower, TIMES_OF_TOWER)
             })
         };
-        low.or_else(|| high().map(DoubtfulHeight::with_other_sign))
+        low.or_else(|| high().map(SuspectHeight::with_other_sign))
     }
 
     /// Returns warnings about the heights of records that the user takes for nodata, and that other heights of the file are next to.
@@ -316,7 +316,7 @@ impl Lowest {
         top: &Lowest,
         few: u64,
         is_apart: impl Fn(&SharedHeight, &[SharedHeight], [f64; 2]) -> bool,
-    ) -> Option<DoubtfulHeight> {
+    ) -> Option<SuspectHeight> {
         let greatest = 0.0 - top.0.first()?.value;
         let is_shared = |(at, height): &(usize, &SharedHeight)| {
             let strays = records(&self.0[..*at]);
@@ -326,7 +326,7 @@ impl Lowest {
         let above = &self.0[at + 1..];
         let others = [above.first()?.value, greatest];
         let is_doubtful = above.len() >= LEAST_VALUES && is_apart(height, above, others);
-        is_doubtful.then_some(DoubtfulHeight { height: *height, others })
+        is_doubtful.then_some(SuspectHeight { height: *height, others })
     }
 }
 
@@ -498,7 +498,7 @@ mod tests {
             let others = (0..500).map(move |i| from + range * f64::from(i % 97) / 96.0);
             extremes(std::iter::repeat_n(0.0, zeros).chain(others))
         };
-        let value = |found: Option<DoubtfulHeight>| found.map(|doubt| doubt.height.value);
+        let value = |found: Option<SuspectHeight>| found.map(|doubt| doubt.height.value);
         assert_eq!(
             (value(plain(5, 85.0, 10.0).set_apart(1.0, 1_000)), plain(5, 85.0, 10.0).doubtful(1.0)),
             (Some(0.0), None)

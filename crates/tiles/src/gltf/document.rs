@@ -24,8 +24,8 @@ use crate::gltf::index_codec::encode_triangles;
 use crate::gltf::meshopt::{PackedFilter, PackedMode, PackedView, fallback_buffer};
 use crate::gltf::metadata;
 use crate::gltf::metadata::METADATA;
-use crate::gltf::parts::SplitPart;
 use crate::gltf::schema::{GENERATOR, MESHOPT, QUANTIZATION, to_text};
+use crate::gltf::split_nodes::SplitNode;
 use crate::gltf::vertex_codec::encode_vertices;
 use crate::gltf::vertex_order::order_vertices;
 use delaunay::geometry::Bounds;
@@ -72,7 +72,7 @@ impl<'a> DocumentBuilder<'a> {
     }
 
     /// Appends a node, its mesh and the data of both.
-    pub(crate) fn add_part(&mut self, part: &SplitPart, sorters: &mut TriangleSorters) -> Result<()> {
+    pub(crate) fn add_part(&mut self, part: &SplitNode, sorters: &mut TriangleSorters) -> Result<()> {
         let tile = &*part.tile;
         let vertices = tile.positions.len();
         // A plain tile has its triangles in ascending order, a packed one in that of `order_vertices`. Either depends on the mesh alone, so
@@ -118,7 +118,7 @@ impl<'a> DocumentBuilder<'a> {
         Ok(())
     }
 
-    fn add_positions(&mut self, part: &SplitPart, order: Option<&[u32]>) -> Result<Index<Accessor>> {
+    fn add_positions(&mut self, part: &SplitNode, order: Option<&[u32]>) -> Result<Index<Accessor>> {
         let positions = &part.tile.positions;
         let (frame, origin) = (self.frame, part.origin);
         let bounds = part.tile.bounds().unwrap_or(Bounds::of_point([0; 3]));

@@ -4,7 +4,7 @@ use crate::compression::Compression;
 use crate::frame::Frame;
 use crate::gltf::container::write_head;
 use crate::gltf::document::{DocumentBuilder, TriangleSorters};
-use crate::gltf::parts::{split, split_short};
+use crate::gltf::split_nodes::{split, split_short};
 use crate::tile::Tile;
 use sys::Result;
 

@@ -67,7 +67,7 @@ impl MeshEngine for ScriptedEngine {
 
 const MAX_PIXELS: u32 = 1 << 22;
 const FINE: Filling = Filling { resolution: TextureResolution::Side(2000), max_bytes: 1 << 20 };
-const ROOM: Room = Room { max_pixels: MAX_PIXELS, max_waiting: 1000 };
+const CAPACITY: Capacity = Capacity { max_pixels: MAX_PIXELS, max_waiting: 1000 };
 
 fn executor(
     starts: impl IntoIterator<Item = Result<(), GpuError>>,
@@ -76,13 +76,13 @@ fn executor(
     let reopens = Arc::<AtomicUsize>::default();
     let (starts, finishes) = (starts.into_iter().collect(), finishes.into_iter().collect());
     let engine = ScriptedEngine { starts, finishes, reopens: reopens.clone() };
-    (open(engine, ROOM, GpuUse::Required), reopens)
+    (open(engine, CAPACITY, GpuUse::Required), reopens)
 }
 
 /// Returns an executor whose engine is open.
-fn open<E: MeshEngine + 'static>(engine: E, room: Room, gpu_use: GpuUse) -> Executor {
+fn open<E: MeshEngine + 'static>(engine: E, capacity: Capacity, gpu_use: GpuUse) -> Executor {
     let executor =
-        Executor::on(move || Ok(Opened { engine, adapter: "test".into(), room, filling: FINE }), room, gpu_use);
+        Executor::on(move || Ok(Opened { engine, adapter: "test".into(), capacity, filling: FINE }), capacity, gpu_use);
     let executor = executor.unwrap();
     while executor.adapter().is_none() {
         std::thread::yield_now();
@@ -142,16 +142,16 @@ impl MeshEngine for WaitingEngine {
     }
 }
 
-fn waiting_executor(gpu_use: GpuUse, room: Room) -> (Executor, Sender<()>, Receiver<usize>) {
+fn waiting_executor(gpu_use: GpuUse, capacity: Capacity) -> (Executor, Sender<()>, Receiver<usize>) {
     let ((go, gone), (leaves, atlases)) = (channel(), channel());
     let engine = WaitingEngine { go: gone, leaves };
-    (open(engine, room, gpu_use), go, atlases)
+    (open(engine, capacity, gpu_use), go, atlases)
 }
 
 /// The mesh comes only after the other work, which only this thread can do.
 #[test]
 fn a_worker_does_other_work_while_it_waits() {
-    let (executor, go, _) = waiting_executor(GpuUse::Required, ROOM);
+    let (executor, go, _) = waiting_executor(GpuUse::Required, CAPACITY);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let (reply, ()) = pool.install(|| rayon::join(|| ask(&executor, 5), || go.send(()).unwrap()));
     assert_eq!(reply, Some(5));
@@ -160,7 +160,7 @@ fn a_worker_does_other_work_while_it_waits() {
 /// One thread has many leaves that wait. Those that come while the device is busy share an atlas.
 #[test]
 fn leaves_that_wait_share_an_atlas() {
-    let (executor, go, atlases) = waiting_executor(GpuUse::Required, ROOM);
+    let (executor, go, atlases) = waiting_executor(GpuUse::Required, CAPACITY);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let first = std::thread::scope(|scope| {
         // The device is busy with the first leaf until all others wait.
@@ -188,7 +188,7 @@ fn leaves(executor: &Executor, xs: std::ops::Range<i32>, tell: &(dyn Fn() + Sync
 
 #[test]
 fn a_job_that_needs_no_gpu_asks_only_while_there_is_room() {
-    let (executor, go, _) = waiting_executor(GpuUse::Optional, Room { max_waiting: 5, ..ROOM });
+    let (executor, go, _) = waiting_executor(GpuUse::Optional, Capacity { max_waiting: 5, ..CAPACITY });
     executor.state.has_answered.store(true, Ordering::Release);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert!(executor.has_room(5) && !executor.has_room(6));
@@ -202,7 +202,7 @@ fn a_job_that_needs_no_gpu_asks_only_while_there_is_room() {
 
 #[test]
 fn a_silent_gpu_is_given_up_and_nobody_waits_for_its_thread() {
-    let (executor, go, _) = waiting_executor(GpuUse::Optional, ROOM);
+    let (executor, go, _) = waiting_executor(GpuUse::Optional, CAPACITY);
     for _ in 0..MOST_ABANDONED {
         assert!(executor.is_worth_asking(FEWEST_SITES));
         executor.benefit.note(false, 1, 1e-3);
@@ -216,7 +216,7 @@ fn a_silent_gpu_is_given_up_and_nobody_waits_for_its_thread() {
 
 #[test]
 fn before_the_first_answer_only_one_leaf_of_a_thread_waits() {
-    let (executor, go, _) = waiting_executor(GpuUse::Optional, ROOM);
+    let (executor, go, _) = waiting_executor(GpuUse::Optional, CAPACITY);
     let is_worth_asking_while_one_waits = || {
         NESTED.set(1);
         let is_worth = executor.is_worth_asking(FEWEST_SITES);
@@ -233,7 +233,7 @@ fn before_the_first_answer_only_one_leaf_of_a_thread_waits() {
 
 #[test]
 fn a_leaf_that_waits_for_a_gpu_that_is_given_up_waits_no_longer() {
-    let (executor, go, _) = waiting_executor(GpuUse::Optional, ROOM);
+    let (executor, go, _) = waiting_executor(GpuUse::Optional, CAPACITY);
     executor.state.is_gone.store(true, Ordering::Release);
     let (_reply, answer) = sync_channel(1);
     assert!(executor.wait_for(&answer, None).is_none());

@@ -7,10 +7,10 @@ use crate::on_device::error::GpuError;
 use crate::on_device::filled_atlas::FilledAtlas;
 use crate::on_device::mesh_steps::FLIP_ROUNDS;
 use crate::on_device::recording::Recording;
-use crate::on_device::twins::atlas;
-use crate::on_device::twins::atlas::{AtlasDiagram, MeshOnDevice};
-use crate::on_device::twins::c4_flip::{FlipState, flip_round};
-use crate::on_device::twins::predicates::decide;
+use crate::on_device::reference_kernels::atlas;
+use crate::on_device::reference_kernels::atlas::{AtlasDiagram, MeshOnDevice};
+use crate::on_device::reference_kernels::c4_flip::{FlipState, flip_round};
+use crate::on_device::reference_kernels::predicates::decide;
 use crate::options::VoronoiMethod;
 use delaunay::geometry::Site;
 use serde::Serialize;
@@ -68,7 +68,7 @@ impl Comparer<'_> {
     }
 }
 
-/// Runs all steps on the leaves of an atlas, on the engine and as twins.
+/// Runs all steps on the leaves of an atlas, on the engine and as reference kernels.
 ///
 /// # Errors
 /// [`GpuError`] of the device.

@@ -6,8 +6,8 @@ use crate::on_device::engine::GpuEngine;
 use crate::on_device::error::GpuError;
 use crate::on_device::mesh_steps::FLIP_ROUNDS;
 use crate::on_device::recording::Recording;
+use crate::on_device::reference_kernels::c4_flip::{AT_INFINITY, FlipState, flip_round};
 use crate::on_device::selftest::compare::StepComparison;
-use crate::on_device::twins::c4_flip::{AT_INFINITY, FlipState, flip_round};
 use delaunay::geometry::Site;
 use std::collections::HashMap;
 

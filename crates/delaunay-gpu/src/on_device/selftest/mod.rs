@@ -26,7 +26,7 @@ const LEAVES: [usize; 4] = [1, 4, 12, 24];
 const SOFTWARE_LEAVES: usize = 4;
 /// Sites in each of them, about as many as in a leaf of a job.
 const SITES_PER_LEAF: u64 = 35_000;
-/// The leaves whose steps are compared with the twins.
+/// The leaves whose steps are compared with the reference kernels.
 const COMPARED: [u64; 4] = [40_000, 30, 3, 5000];
 /// Pixels a site in the textures.
 const PIXELS_PER_SITE: TextureResolution = TextureResolution::PixelsPerSite(16.0);

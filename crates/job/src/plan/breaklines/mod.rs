@@ -1,7 +1,6 @@
 //! Breaklines in the plan: the files of lines are read, brought to the lattice and cut. What they are cut from is kept in the plan, so that
 //! every task and every later run cuts the same, and needs none of the files.
 
-mod height_doubts;
 mod line_crs;
 pub(crate) mod line_files;
 mod on_lattice;
@@ -9,6 +8,7 @@ mod other_unit;
 mod planned;
 mod sentences;
 mod spacing;
+mod suspect_heights;
 mod terrain;
 
 pub(crate) use line_crs::SystemOfPoints;

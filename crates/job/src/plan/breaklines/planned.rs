@@ -1,11 +1,11 @@
 //! The breaklines of a plan.
 
 use crate::options::JobOptions;
-use crate::plan::breaklines::height_doubts::height_doubts;
 use crate::plan::breaklines::line_files::LineFiles;
 use crate::plan::breaklines::on_lattice::on_lattice;
 use crate::plan::breaklines::sentences::sentences;
 use crate::plan::breaklines::spacing::spacing;
+use crate::plan::breaklines::suspect_heights::suspect_heights;
 use crate::plan::breaklines::terrain::SampledTerrain;
 use crate::plan::extent::Extent;
 use breaklines::{
@@ -100,7 +100,7 @@ impl PlannedBreaklines {
         nearest.settle(&mut built);
         refuse_sites_without_height(&built, &files.files, cloud.lattice)?;
         let terrain = SampledTerrain::new(cloud.sample, cloud.metres, cloud.lattice, cloud.clipped);
-        warnings.extend(height_doubts(&files.files, &features, &terrain)?);
+        warnings.extend(suspect_heights(&files.files, &features, &terrain)?);
         warnings.extend(sentences(&files.files, cloud.lattice, &options, &findings, features_outside));
         Ok(Some(PlannedBreaklines {
             files: files.files.iter().map(|file| file.path.clone()).collect(),

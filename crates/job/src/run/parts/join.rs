@@ -9,13 +9,13 @@ use crate::plan::budget::merge_memory;
 use crate::progress::stats::StageStats;
 use crate::records::{JobStep, JournalEntry, StepRecord, Store};
 use crate::run::part_entries::{PartHeader, entries_of, is_whole, open_store, records_of};
+use crate::run::parts::appearance::{SitesOfParts, count_sites, final_appearance};
 use crate::run::parts::done::Done;
-use crate::run::parts::look::{SitesOfParts, count_sites, final_look};
 use crate::run::parts::part_journal::PartSession;
 use crate::run::parts::part_store::{OpenPart, PartStores};
 use crate::run::parts::parts_job::PartsJob;
 use crate::run::run_context::RunContext;
-use crate::run::tile_queue::TileLook;
+use crate::run::tile_queue::TileAppearance;
 use std::sync::Arc;
 use sys::Result;
 
@@ -25,7 +25,7 @@ pub(crate) struct JoinedParts {
     pub(crate) store: Store,
     pub(crate) header: PartHeader,
     /// How tiles look, now that all sites are known.
-    pub(crate) look: Arc<TileLook>,
+    pub(crate) appearance: Arc<TileAppearance>,
     pub(crate) stages: Vec<StageStats>,
     /// The largest resident set of the process that merged, in bytes.
     pub(crate) peak_memory: Option<u64>,
@@ -160,17 +160,24 @@ impl JoinedParts {
             return Ok(None);
         };
         let store = open_store(&directory, &records_of(&entries))?;
-        Ok(Some(JoinedParts { look: final_look(job, all, &store)?, store, directory, header, stages, peak_memory }))
+        Ok(Some(JoinedParts {
+            appearance: final_appearance(job, all, &store)?,
+            store,
+            directory,
+            header,
+            stages,
+            peak_memory,
+        }))
     }
 
     /// Opens what there is of the merges while parts are still to be done.
     ///
     /// # Errors
     /// As [`JoinedParts::open`].
-    pub(crate) fn so_far(job: &PartsJob, look: Arc<TileLook>) -> Result<JoinedParts> {
+    pub(crate) fn so_far(job: &PartsJob, appearance: Arc<TileAppearance>) -> Result<JoinedParts> {
         let (directory, header) = (job.directory.join(), job.header(job.above()));
         let store = open_store(&directory, &records_of(&entries_of(&directory, header)?))?;
-        Ok(JoinedParts { look, store, directory, header, stages: Vec::new(), peak_memory: None })
+        Ok(JoinedParts { appearance, store, directory, header, stages: Vec::new(), peak_memory: None })
     }
 
     /// Returns what all seams have of `tile` of the part with `store` and `tree`.

@@ -39,7 +39,7 @@ pub(crate) fn levels_of_part(
     if has_tileset {
         let hierarchy = hierarchy_of(job.plan, &open.partition);
         let no_other = |other: PartIndex| Err(Error::Broken(format!("part {part} has no tile of part {other}")));
-        stats = make_levels(&context, job.plan, part, hierarchy, &joined.look.style, &no_other)?.stats;
+        stats = make_levels(&context, job.plan, part, hierarchy, &joined.appearance.style, &no_other)?.stats;
     }
     let stages = context.stages.into_inner().unwrap_or_else(PoisonError::into_inner);
     session.finish(JobStep::Levels, stats, stages, Vec::new())

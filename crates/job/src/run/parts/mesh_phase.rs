@@ -13,7 +13,7 @@ use crate::run::parts::part_journal::PartSession;
 use crate::run::parts::parts_job::PartsJob;
 use crate::run::parts::read_phase::points_of;
 use crate::run::resume_parts::resume_part;
-use crate::run::tile_queue::TileLook;
+use crate::run::tile_queue::TileAppearance;
 use std::sync::{Arc, PoisonError};
 use sys::{Error, Result};
 
@@ -26,7 +26,7 @@ use sys::{Error, Result};
 pub(crate) fn mesh_one(
     job: &PartsJob,
     part: PartIndex,
-    look: Option<&Arc<TileLook>>,
+    appearance: Option<&Arc<TileAppearance>>,
     others: Option<u64>,
 ) -> Result<MeshedPart> {
     let directory = &job.directory.part(part);
@@ -42,7 +42,14 @@ pub(crate) fn mesh_one(
                     let max_edge = job.plan.options.output.max_edge;
                     let (entries, partition) =
                         resume_part(directory, entries_of(directory, header)?, max_edge, job.progress)?;
-                    mesh(job, PartSession::begin(directory, lock, header, entries)?, part, partition, look, others)?
+                    mesh(
+                        job,
+                        PartSession::begin(directory, lock, header, entries)?,
+                        part,
+                        partition,
+                        appearance,
+                        others,
+                    )?
                 }
             }
         }
@@ -62,7 +69,7 @@ fn mesh(
     session: PartSession,
     part: PartIndex,
     partition: Option<Partition>,
-    look: Option<&Arc<TileLook>>,
+    appearance: Option<&Arc<TileAppearance>>,
     others: Option<u64>,
 ) -> Result<MeshedPart> {
     let context = session.context(job);
@@ -75,7 +82,7 @@ fn mesh(
             partition
         }
     };
-    let writing = look.map_or(Writing::Later, |look| Writing::AtOnce(look.clone()));
+    let writing = appearance.map_or(Writing::Later, |appearance| Writing::AtOnce(appearance.clone()));
     let mesh = mesh_part(&context, job.plan, &partition, writing)?;
     let own = context.temporary.measure(&partition, context.store);
     let stages: Vec<StageStats> = context.stages.into_inner().unwrap_or_else(PoisonError::into_inner);

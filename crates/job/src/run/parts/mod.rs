@@ -3,11 +3,10 @@
 //! A part is meshed as soon as all inputs that reach it have been read, and its points go then. Tiles that touch other parts wait for
 //! the nodes above the parts. Every part has a folder, a journal and a store of its own.
 
+pub(crate) mod appearance;
 pub(crate) mod done;
-mod front;
 pub(crate) mod join;
 pub(crate) mod level_phase;
-pub(crate) mod look;
 pub(crate) mod mesh_phase;
 pub(crate) mod meshed_part;
 mod part_journal;
@@ -16,6 +15,7 @@ pub(crate) mod parts_job;
 mod publish_parts;
 pub(crate) mod read_phase;
 pub(crate) mod tile_phase;
+mod waiting_tiles;
 
 use crate::durable::directory::JobDirectory;
 use crate::index::PartIndex;
@@ -26,10 +26,9 @@ use crate::progress::stats::StageStats;
 use crate::records::{JobStep, Journal, StepOutput};
 use crate::report::job_report::Report;
 use crate::run::damage::is_damage;
-use crate::run::parts::front::Front;
+use crate::run::parts::appearance::{SitesOfParts, early_appearance};
 use crate::run::parts::join::{JoinedParts, join_parts};
 use crate::run::parts::level_phase::levels_of_part;
-use crate::run::parts::look::{SitesOfParts, early_look};
 use crate::run::parts::mesh_phase::{drop_damaged_steps, mesh_one};
 use crate::run::parts::meshed_part::MeshedPart;
 use crate::run::parts::part_store::PartStores;
@@ -37,6 +36,7 @@ use crate::run::parts::parts_job::PartsJob;
 use crate::run::parts::publish_parts::publish_parts;
 use crate::run::parts::read_phase::{read_for, sum_up};
 use crate::run::parts::tile_phase::{ForeignBorders, finish_part};
+use crate::run::parts::waiting_tiles::WaitingTiles;
 use crate::run::publish_step::wants_tileset;
 use crate::run::run_context::RunContext;
 use crate::tiles::curve::curvature_of;
@@ -105,8 +105,8 @@ fn read_and_mesh(
     job: &PartsJob,
     stores: &PartStores,
 ) -> Result<(Vec<MeshedPart>, Bounds<3>, HashMap<PartIndex, StageStats>)> {
-    let look = early_look(job)?;
-    let mut front = look.clone().map(|look| Front::new(job, stores, look)).transpose()?;
+    let appearance = early_appearance(job)?;
+    let mut front = appearance.clone().map(|appearance| WaitingTiles::new(job, stores, appearance)).transpose()?;
     let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
     // Bytes of points that wait, by part.
     let mut waiting = vec![0; job.parts.all().len()];
@@ -120,7 +120,7 @@ fn read_and_mesh(
             None => meshed.iter().map(|part| part.stored).sum::<u64>(),
         };
         let others = waiting[part.get() + 1..].iter().sum::<u64>() + stored;
-        let done = mesh_one(job, part, look.as_ref(), Some(others))?;
+        let done = mesh_one(job, part, appearance.as_ref(), Some(others))?;
         if job.checks {
             drop_damaged_steps(job, part)?;
         }

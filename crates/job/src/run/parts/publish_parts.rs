@@ -48,7 +48,7 @@ pub(crate) fn publish_parts(
     let all = TilesOfParts { job, stores };
     let written =
         WrittenFiles { stats: figures.tiles, hull: Seam::hull_count(&joined.store, NodeIndex::ROOT)?, tiles: &all };
-    let published = publish(run, plan, bounds, &written, &joined.look, tileset.transpose()?)?;
+    let published = publish(run, plan, bounds, &written, &joined.appearance, tileset.transpose()?)?;
     let figures = MeshFigures {
         points: summary.counts,
         leaves: figures.leaves,
@@ -139,7 +139,7 @@ fn levels_and_root(
         let open = stores.open(part)?;
         Child::top(job.directory, &open.store, &open.partition.tree)
     };
-    let above = make_levels(&context, plan, parts.tree.part, hierarchy, &joined.look.style, &top_of)?;
+    let above = make_levels(&context, plan, parts.tree.part, hierarchy, &joined.appearance.style, &top_of)?;
     let stages = context.stages.into_inner().unwrap_or_else(PoisonError::into_inner);
     stages.into_iter().for_each(|stage| run.add_stage(stage));
     let mut stats = figures.levels;

@@ -13,7 +13,7 @@ use crate::run::parts::join::JoinedParts;
 use crate::run::parts::part_journal::PartSession;
 use crate::run::parts::part_store::{OpenPart, PartStores};
 use crate::run::parts::parts_job::PartsJob;
-use crate::run::tile_queue::TileLook;
+use crate::run::tile_queue::TileAppearance;
 use crate::tiles::border_normals::{finish_border_normals, finished_border};
 use crate::tiles::write_tile::{TileStats, write_tile};
 use rayon::prelude::*;
@@ -97,7 +97,7 @@ impl<'a> BorderSession<'a> {
     /// # Errors
     /// Those of [`finish_border_normals`].
     pub(crate) fn finish_borders(&self, tiles: &[TileIndex]) -> Result<Vec<(TileIndex, Vec<TileIndex>)>> {
-        let (tree, style) = (&self.partition().tree, &self.borders.joined.look.style);
+        let (tree, style) = (&self.partition().tree, &self.borders.joined.appearance.style);
         let finish = |&tile: &TileIndex| {
             let work = || finish_border_normals(self.store(), tree, style, tile, &self.seam(tile)?);
             Ok((tile, self.session.journal.step(JobStep::BorderNormals(tile), work)?))
@@ -110,7 +110,7 @@ impl<'a> BorderSession<'a> {
     /// # Errors
     /// Those of [`write_tile`].
     pub(crate) fn write_tiles(&self, tiles: &[TileIndex]) -> Result<TileStats> {
-        let TileLook { style, canvas } = &*self.borders.joined.look;
+        let TileAppearance { style, canvas } = &*self.borders.joined.appearance;
         let border_of = |other: TileIndex| match other.part() == self.part {
             true => FinishedBorder::load(self.store(), other),
             false => self.borders.of(other),
@@ -191,6 +191,6 @@ impl<'a> ForeignBorders<'a> {
             return FinishedBorder::load(store, tile);
         }
         let seam = self.joined.seam_of(self.job, store, &partition.tree, tile)?;
-        finished_border(store, &partition.tree, &self.joined.look.style, tile, &seam)
+        finished_border(store, &partition.tree, &self.joined.appearance.style, tile, &seam)
     }
 }

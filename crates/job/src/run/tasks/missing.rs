@@ -7,10 +7,10 @@ use crate::phase::{Phase, PhaseTasks};
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::Fingerprint;
 use crate::records::JobStep;
-use crate::run::alone::Alone;
 use crate::run::finished::{InPlace, is_rest};
 use crate::run::part_entries::{PartHeader, entries_of_steps};
 use crate::run::parts::done::PartProgress;
+use crate::run::single_process::SingleProcess;
 use crate::run::tasks::dealing::deal;
 use crate::run::tasks::finished_job::in_place;
 use crate::run::tasks::planned_job::{PlannedJob, planned};
@@ -136,7 +136,7 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
 pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     let directory = JobDirectory::new(&options.output.directory);
     let only_publish = || of_each(tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() });
-    if Alone::find(&directory, 0)?.is_some() {
+    if SingleProcess::find(&directory, 0)?.is_some() {
         return Ok(only_publish());
     }
     match PlannedJob::open(&directory, options, 0)? {

@@ -18,9 +18,9 @@ use crate::phase::{Phase, Task};
 use crate::progress::clock::JobClock;
 use crate::report::job_report::Report;
 use crate::report::task_outcome::{DoneTask, TaskOutcome};
-use crate::run::alone::Alone;
 use crate::run::attempt::{EarlierWork, Walk, run_until_it_fits};
 use crate::run::finished::{InPlace, remove_rest};
+use crate::run::single_process::SingleProcess;
 use crate::run::tasks::finished_job::in_place;
 use crate::run::tasks::missing::{JobProgressByPart, not_planned};
 use crate::run::tasks::part_tasks::work_on_parts;
@@ -59,7 +59,7 @@ pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Ta
 
 /// Publishes a job whose other phases are complete, or does all of a job that tasks have left to one process.
 fn publish(directory: &JobDirectory, options: &JobOptions, run: RunOptions, task: Task, walk: Walk) -> Result<Report> {
-    let work = match Alone::find(directory, run.submission)? {
+    let work = match SingleProcess::find(directory, run.submission)? {
         Some(_) => EarlierWork::Interrupted,
         None => {
             let job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;

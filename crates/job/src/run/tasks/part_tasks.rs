@@ -8,19 +8,19 @@ use crate::phase::{Phase, Task};
 use crate::plan::budget::workers;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
-use crate::run::alone::Alone;
 use crate::run::attempt::{NO_LOCKS, may_coarsen};
 use crate::run::damage::{damaged_by_tasks, is_cut_off};
+use crate::run::parts::appearance::{SitesOfParts, early_appearance};
 use crate::run::parts::done::PartProgress;
 use crate::run::parts::join::{JoinedParts, join_parts};
 use crate::run::parts::level_phase::levels_of_part;
-use crate::run::parts::look::{SitesOfParts, early_look};
 use crate::run::parts::mesh_phase::{drop_damaged_steps, mesh_one};
 use crate::run::parts::part_store::PartStores;
 use crate::run::parts::parts_job::PartsJob;
 use crate::run::parts::read_phase::{read_for, sum_up};
 use crate::run::parts::tile_phase::{ForeignBorders, finish_part};
 use crate::run::publish_step::wants_tileset;
+use crate::run::single_process::SingleProcess;
 use crate::run::tasks::dealing::deal;
 use crate::run::tasks::missing::{JobProgressByPart, not_planned, too_early};
 use crate::run::tasks::planned_job::PlannedJob;
@@ -46,8 +46,8 @@ pub(crate) fn work_on_parts(
     if !lock.is_real() {
         run.progress.note(NO_LOCKS);
     }
-    if Alone::find(directory, run.submission)?.is_some() {
-        return Ok((0, Some(format!("nothing to do: {}", Alone::SENTENCE))));
+    if SingleProcess::find(directory, run.submission)?.is_some() {
+        return Ok((0, Some(format!("nothing to do: {}", SingleProcess::SENTENCE))));
     }
     let mut job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
     if job.is_complete {
@@ -64,14 +64,14 @@ pub(crate) fn work_on_parts(
     let worked =
         on_threads(workers(options, job.plan.records)?, || PartTask { job: &job, run, phase, task }.work(&mine));
     let (alone, why) = match worked {
-        Err(Error::NeedsOnePart) => (Alone::InOnePart, "what was read contradicts the header of a file".into()),
-        Err(Error::TooFine { vertical, what }) if may_coarsen(options, vertical) => (Alone::AsItIs, what),
+        Err(Error::NeedsOnePart) => (SingleProcess::AsOnePart, "what was read contradicts the header of a file".into()),
+        Err(Error::TooFine { vertical, what }) if may_coarsen(options, vertical) => (SingleProcess::AsPlanned, what),
         Err(Error::DamagedSteps) => return Err(damaged_by_tasks(directory)),
         Err(error) if is_cut_off(&error, directory) => return Err(damaged_by_tasks(directory)),
         worked => return worked.map(|()| (mine.len() as u64, None)),
     };
     alone.note(directory, job.header.submission)?;
-    Ok((mine.len() as u64, Some(format!("{why}; {}", Alone::SENTENCE))))
+    Ok((mine.len() as u64, Some(format!("{why}; {}", SingleProcess::SENTENCE))))
 }
 
 /// Returns the parts of `phase` that fall to `task`. A phase with one task does all.
@@ -84,7 +84,7 @@ fn parts_of(job: &PlannedJob, phase: Phase, task: Task) -> Vec<PartIndex> {
 fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
     let journal = directory.journal();
     let is_there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.contains(&journal);
-    let is_left = || Alone::find(directory, submission).map(|alone| alone.is_some());
+    let is_left = || SingleProcess::find(directory, submission).map(|alone| alone.is_some());
     if is_there || is_left()? { directory.share_lock().map(Some) } else { Ok(None) }
 }
 
@@ -149,8 +149,8 @@ impl PartTask<'_> {
         let readers: Vec<PartIndex> = mine.iter().flat_map(|&part| job.parts.readers_of(part)).collect();
         let is_reader = |part: PartIndex| readers.contains(&part);
         JobProgressByPart::of_parts(self.job, is_reader)?.require(Phase::Read, self.task.count, is_reader)?;
-        let look = early_look(job)?;
-        self.each(mine, |part| mesh_one(job, part, look.as_ref(), None).map(|_| ()))
+        let appearance = early_appearance(job)?;
+        self.each(mine, |part| mesh_one(job, part, appearance.as_ref(), None).map(|_| ()))
     }
 
     fn join(&self, job: &PartsJob) -> Result<()> {

@@ -7,19 +7,19 @@ use crate::partition::parts::Parts;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::plan::make_plan::make_plan;
-use crate::preflight::check::require_room;
+use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::raster::check::check_raster;
-use crate::run::alone::Alone;
 use crate::run::attempt::{coarsening_of, read_earlier};
 use crate::run::finished::known_submission;
 use crate::run::parts::write_plan;
 use crate::run::read_step::note_skipped;
 use crate::run::resume::EarlierRun;
 use crate::run::resume_parts::start_parts;
+use crate::run::single_process::SingleProcess;
 use crate::run::tasks::planned_job::planned;
 use std::time::SystemTime;
 use sys::threads::on_threads;
@@ -60,13 +60,17 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
     let threads = workers(options, plan.records)?;
     if !run.force {
-        on_threads(threads, || require_room(&plan, threads))?;
+        on_threads(threads, || require_memory_and_disk(&plan, threads))?;
     }
     if plan.is_one_part() {
-        Alone::AsItIs.note(directory, submission)?;
-        return Ok(Some(format!("the job has only {} points, which is one part; {}", plan.records, Alone::SENTENCE)));
+        SingleProcess::AsPlanned.note(directory, submission)?;
+        return Ok(Some(format!(
+            "the job has only {} points, which is one part; {}",
+            plan.records,
+            SingleProcess::SENTENCE
+        )));
     }
-    Alone::forget(directory)?;
+    SingleProcess::forget(directory)?;
     on_threads(threads, || {
         let start = start_parts(directory, &header, earlier, run.progress)?;
         write_plan(&start.journal, directory, plan)?;

@@ -65,7 +65,7 @@ impl PlannedJob {
 /// [`Error::Io`] if its journal cannot be read.
 pub(crate) fn planned(directory: &JobDirectory, submission: u64) -> Result<Option<(JobHeader, bool)>> {
     // Other machines may have made the folders.
-    directory.look()?;
+    directory.probe()?;
     disk::list(&directory.parts()).map_err(Error::io("read", directory.parts()))?;
     let wanted = |step| matches!(step, JobStep::Plan | JobStep::Report);
     let read = journal::read_steps::<JobHeader, JobStep, StepRecord>(directory, wanted)?;

@@ -6,8 +6,8 @@ use crate::options::JobOptions;
 use crate::phase::Phase;
 use crate::report::job_report::SlowestPart;
 use crate::report::job_status::{JobState, JobStatus, PhaseStatus};
-use crate::run::alone::Alone;
 use crate::run::finished::InPlace;
+use crate::run::single_process::SingleProcess;
 use crate::run::tasks::finished_job::in_place;
 use crate::run::tasks::missing::JobProgressByPart;
 use crate::run::tasks::planned_job::PlannedJob;
@@ -21,7 +21,7 @@ pub(crate) fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStat
     let directory = JobDirectory::new(&options.output.directory);
     let output = options.output.directory.clone();
     let simple = |state| JobStatus { output: output.clone(), state, phases: Vec::new(), slowest_part: None };
-    if Alone::find(&directory, 0)?.is_some() {
+    if SingleProcess::find(&directory, 0)?.is_some() {
         return Ok(simple(JobState::LeftToPublish));
     }
     let without_plan = match in_place(&directory, options, 0)? {

@@ -9,9 +9,9 @@ use ureq::{Agent, Body};
 
 use crate::remote::name::address;
 use crate::remote::network::failure::{Failure, FailureKind};
-use crate::remote::network::patience::Patience;
 use crate::remote::network::s3::S3Settings;
 use crate::remote::network::signature::{UnsignedRequest, encoded};
+use crate::remote::network::timeouts::Timeouts;
 use crate::remote::traffic::count_request;
 use sys::Result;
 
@@ -46,7 +46,7 @@ struct Agents {
 }
 
 static AGENTS: LazyLock<Agents> = LazyLock::new(|| {
-    let Patience { answer, .. } = Patience::standard();
+    let Timeouts { answer, .. } = Timeouts::standard();
     let tls = TlsConfig::builder().root_certs(trusted()).build();
     let agent = |https_only, redirects| {
         Agent::config_builder()

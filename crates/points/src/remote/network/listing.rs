@@ -8,8 +8,8 @@ use glob::{MatchOptions, Pattern};
 
 use crate::remote::network::client::{Address, Headers, refusal};
 use crate::remote::network::failure::{Failure, FailureKind};
-use crate::remote::network::patience::{Patience, persist};
 use crate::remote::network::signature::encoded;
+use crate::remote::network::timeouts::{Timeouts, persist};
 use crate::remote::network::window::Pending;
 use sys::{Error, Result};
 
@@ -130,7 +130,7 @@ fn query(prefix: &str, is_in_one_folder: bool, next: Option<&str>) -> String {
 
 fn page(address: Address, name: &str) -> Result<Page> {
     let fetch = move || {
-        persist(Patience::standard(), false, || {
+        persist(Timeouts::standard(), false, || {
             let answer = address.ask(&Headers::new()).map_err(|failure| (0, failure))?;
             if answer.status() != 200 {
                 return Err((0, refusal(answer, &address)));

@@ -1,6 +1,6 @@
 //! Requests to other machines, with the feature `remote`.
 //!
-//! `client` makes single requests, `transfer` as many as a range takes, with the `patience` to ask again, and `window` lets them run while
+//! `client` makes single requests, `transfer` as many as a range takes, with the `timeouts` to ask again, and `window` lets them run while
 //! others work. `read_plan` knows what will be read, so that few requests bring it ahead of time. Whoever reads a file has it `held`.
 
 mod client;
@@ -8,10 +8,10 @@ mod failure;
 mod file;
 mod held;
 mod listing;
-mod patience;
 mod read_plan;
 mod s3;
 mod signature;
+mod timeouts;
 mod transfer;
 mod window;
 

@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::remote::network::client::{Address, Headers, refusal};
 use crate::remote::network::failure::{Failure, FailureKind};
-use crate::remote::network::patience::{Patience, persist};
+use crate::remote::network::timeouts::{Timeouts, persist};
 use crate::remote::traffic::count_bytes;
 
 /// The bytes that are taken from a connection at once.
@@ -72,7 +72,7 @@ pub(crate) fn transfer(
     version: Option<&Version>,
 ) -> Result<Transferred, Failure> {
     let mut transfer = Transfer { address, range, version: version.cloned(), bytes: Vec::new() };
-    persist(Patience::standard(), version.is_some(), || {
+    persist(Timeouts::standard(), version.is_some(), || {
         let before = transfer.bytes.len();
         transfer.attempt().map_err(|failure| (transfer.bytes.len() - before, failure))
     })?;

@@ -1,0 +1,90 @@
+//! How tiles look in a job of several parts.
+
+use crate::durable::columns::{ColumnReader, ColumnWriter};
+use crate::index::TileIndex;
+use crate::plan::job_plan::HeaderClaims;
+use crate::records::{Leaf, RecordRef, StepRecord, Store};
+use crate::run::parts::part_store::PartStores;
+use crate::run::parts::parts_job::PartsJob;
+use crate::run::tile_queue::TileAppearance;
+use crate::tiles::max_edge::MaxEdgeRule;
+use delaunay::geometry::Bounds;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use sys::{Error, Result};
+use tiles::options::MaxEdge;
+
+/// What all parts hold.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct SitesOfParts {
+    pub(crate) sites: u64,
+    /// The lattice box of the points.
+    pub(crate) bounds: Bounds<3>,
+}
+
+/// Returns how tiles look, unless all sites decide that.
+///
+/// # Errors
+/// [`Error::Broken`] if the job has no claims.
+pub(crate) fn early_appearance(job: &PartsJob) -> Result<Option<Arc<TileAppearance>>> {
+    match job.plan.options.output.max_edge {
+        MaxEdge::Auto => Ok(None),
+        choice => {
+            // No rule but "auto" looks at the sites.
+            let rule = MaxEdgeRule::new(choice, &job.plan.frame, 0, bounds(job)?, &|_| Ok(()))?;
+            appearance(job, rule).map(|appearance| Some(Arc::new(appearance)))
+        }
+    }
+}
+
+/// Counts all sites for the rule that looks at them, if the job has it, and stores the counts. The claims would give the rule another grid
+/// than the points themselves do in a job of one part.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on a store.
+pub(crate) fn count_sites(
+    job: &PartsJob,
+    stores: &PartStores,
+    all: SitesOfParts,
+    store: &Store,
+) -> Result<Option<RecordRef>> {
+    let choice = job.plan.options.output.max_edge;
+    if choice != MaxEdge::Auto {
+        return Ok(None);
+    }
+    let visit = |visit: &(dyn Fn(&[i32; 3]) + Sync)| {
+        job.parts.all().try_for_each(|part| {
+            let open = stores.open(part)?;
+            let tiles: Vec<TileIndex> = open.partition.tree.tiles().collect();
+            tiles.into_par_iter().try_for_each(|tile| Leaf::visit_positions(&open.store, tile, visit))
+        })
+    };
+    let rule = MaxEdgeRule::new(choice, &job.plan.frame, all.sites, all.bounds, &visit)?;
+    ColumnWriter::default().push(rule.counts()).write(store, StepRecord::Spacing).map(Some)
+}
+
+/// Returns how tiles look. If all sites decide that, `store` has their counts.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the store.
+pub(crate) fn final_appearance(job: &PartsJob, all: SitesOfParts, store: &Store) -> Result<Arc<TileAppearance>> {
+    if let Some(appearance) = early_appearance(job)? {
+        return Ok(appearance);
+    }
+    let counts = ColumnReader::open(store, StepRecord::Spacing)?.column_vec()?;
+    appearance(job, MaxEdgeRule::of_counts(all.sites, all.bounds, counts)?).map(Arc::new)
+}
+
+fn appearance(job: &PartsJob, rule: MaxEdgeRule) -> Result<TileAppearance> {
+    let HeaderClaims { bounds, max_rgb } = claims(job)?;
+    TileAppearance::new(job.plan, max_rgb, bounds, rule)
+}
+
+fn bounds(job: &PartsJob) -> Result<Bounds<3>> {
+    claims(job).map(|claims| claims.bounds)
+}
+
+fn claims(job: &PartsJob) -> Result<HeaderClaims> {
+    job.plan.claims.ok_or_else(|| Error::Broken("a job of several parts has no claims".into()))
+}

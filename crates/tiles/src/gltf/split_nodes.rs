@@ -1,0 +1,103 @@
+//! Cuts tiles that are wider than f32 can hold in the job's steps into parts, each with its own translation.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use crate::axis_scale::NODE_REACH;
+use crate::frame::{FINE_GRID, Frame, origin_between, short_origin};
+use crate::tile::Tile;
+use lattice::shortest_decimal;
+use rust_decimal::Decimal;
+use sys::{Error, Result};
+
+/// The distance in steps between the origins of parts. Half of it and half a triangle stay within reach, unless the triangle is very
+/// long.
+const COARSE_GRID: i64 = 1 << 24;
+
+/// The part of a tile that becomes one node and its mesh.
+pub(crate) struct SplitNode<'a> {
+    /// The node's translation in glTF steps.
+    pub(crate) origin: [f64; 3],
+    /// Whether 16 bits reach every vertex from the origin.
+    pub(crate) short: bool,
+    /// The vertices and triangles, all within reach of the origin.
+    pub(crate) tile: Cow<'a, Tile>,
+}
+
+/// Returns the parts of `tile`, each within reach of f32. A tile that is small enough is one part.
+///
+/// # Errors
+/// [`Error::Config`] if a single triangle is too long.
+pub(crate) fn split<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<SplitNode<'a>>> {
+    let Some(bounds) = tile.bounds() else { return Ok(Vec::new()) };
+    if let Some(origin) = common_origin(frame.extent_within(&tile.positions, bounds), FINE_GRID) {
+        return Ok(vec![SplitNode { origin, short: false, tile: Cow::Borrowed(tile) }]);
+    }
+    split_triangles(frame, tile, &tile.triangles)
+}
+
+/// Returns the parts of these triangles of `tile`.
+fn split_triangles(frame: &Frame, tile: &Tile, triangles: &[[u32; 3]]) -> Result<Vec<SplitNode<'static>>> {
+    let mut groups = BTreeMap::<[i64; 3], Vec<[u32; 3]>>::new();
+    for &triangle in triangles {
+        let corners = triangle.map(|v| tile.positions[v as usize]);
+        let extent = frame.extent(&corners);
+        let origin = common_origin(extent, COARSE_GRID)
+            .or_else(|| common_origin(extent, FINE_GRID))
+            .ok_or_else(|| too_long(frame, corners))?;
+        groups.entry(origin.map(|v| v as i64)).or_default().push(triangle);
+    }
+    let part = |(origin, triangles): ([i64; 3], _)| SplitNode {
+        origin: origin.map(|v| v as f64),
+        short: false,
+        tile: Cow::Owned(tile.subset(triangles)),
+    };
+    Ok(groups.into_iter().map(part).collect())
+}
+
+/// Returns one part with 16-bit positions if they reach all of `tile`, else what [`split`] does.
+///
+/// # Errors
+/// As [`split`].
+pub(crate) fn split_short<'a>(frame: &Frame, tile: &'a Tile) -> Result<Vec<SplitNode<'a>>> {
+    let Some(bounds) = tile.bounds() else { return Ok(Vec::new()) };
+    let [low, high] = frame.extent_within(&tile.positions, bounds);
+    match short_origin(low, high) {
+        Some(origin) => Ok(vec![SplitNode { origin, short: true, tile: Cow::Borrowed(tile) }]),
+        None => split(frame, tile),
+    }
+}
+
+/// Returns the origin on `grid` next to the middle between `low` and `high`, in steps, if both are within reach of it.
+fn common_origin([low, high]: [[f64; 3]; 2], grid: i64) -> Option<[f64; 3]> {
+    let origin = origin_between(low, high, grid);
+    let reach = (NODE_REACH + FINE_GRID / 2) as f64;
+    (0..3).all(|k| high[k] - origin[k] <= reach && origin[k] - low[k] <= reach).then_some(origin)
+}
+
+fn too_long(frame: &Frame, corners: [[i32; 3]; 3]) -> Error {
+    let [low, high] = frame.extent(&corners);
+    let (length, limit) = (frame.metres([0, 1, 2].map(|k| high[k] - low[k])), frame.longest_triangle());
+    let factor = [length[0] / limit[0], length[2] / limit[0], length[1] / limit[1]].into_iter().fold(1.0, f64::max);
+    let extras = frame.extras();
+    let (resolution, key, extent) = if length[1] / limit[1] == factor {
+        (extras.resolution_z, "in z", length[1])
+    } else {
+        (extras.resolution, "in x and y", length[0].max(length[2]))
+    };
+    let workable = coarser(resolution, factor);
+    Error::Config(format!(
+        "a triangle that is {extent:.1} m long cannot be written exactly with a resolution of {resolution} {key} \
+         (glTF has 24 binary digits for a coordinate): set [input] resolution = {workable} or coarser, or leave out \
+         the far-off points with bounds"
+    ))
+}
+
+/// Returns `resolution` times the least power of ten that makes room for a triangle `factor` times too long.
+fn coarser(resolution: f64, factor: f64) -> String {
+    // Ten times the resolution gives at least eight times the step, a power of two.
+    let room = std::iter::successors(Some(8.0), |room| Some(room * 8.0));
+    let tens = 1 + room.take_while(|room| *room < factor).take(19).count() as i32;
+    let exact = shortest_decimal(resolution).and_then(|r| (0..tens).try_fold(r, |r, _| r.checked_mul(Decimal::TEN)));
+    exact.map_or_else(|| format!("{:e}", resolution * 10f64.powi(tens)), |r| r.normalize().to_string())
+}
