@@ -212,6 +212,13 @@ fn the_mistake_that_explains_the_place_is_named() {
             "With 2000000 subtracted from x and 1000000 subtracted from y",
         ),
         ("south.csv", [333_000.0, -3_740_000.0], 7.0, 7856, "With 10000000 added to y"),
+        (
+            "south_of_north.csv",
+            [330_148.0, 7_395_154.0],
+            7.0,
+            31976,
+            "set [input] crs = \"EPSG:31982\" (SIRGAS 2000 / UTM zone 22S)",
+        ),
         ("krovak.csv", [744_000.0, 1_041_000.0], 7.0, 5514, "With the sign of x and y changed"),
         ("km.csv", [500.0, 5_500.0], 0.007, 25832, "In the unit kilometre"),
         ("degrees.csv", [2.35, 48.85], 1e-4, 2154, "As longitude and latitude, they lie within it"),

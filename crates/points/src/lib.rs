@@ -42,6 +42,7 @@ pub use crs::transform::between::CrsTransform;
 pub use crs::transform::between::DatumNote;
 pub use crs::transform::datum_rule::DatumRule;
 pub use crs::transform::to_globe::GlobeWay;
+pub(crate) use crs::transform::utm::utm_zone;
 pub use crs::unit::Unit;
 pub use crs::unit::same_length;
 pub use crs::vertical::VerticalSystem;

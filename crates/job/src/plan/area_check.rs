@@ -299,6 +299,8 @@ impl Outside {
             let there = said.of_place_in_file(changed);
             let is_there = match change {
                 Change::ExchangedNearBy => there.is_some_and(|place| is_beside(beyond_area(&place))),
+                // It leads to the area of another system.
+                Change::Southern(..) => !said.is_target,
                 Change::Exchanged if is_near && arc(beyond) <= EXCHANGED => false,
                 _ => change.is_in_degrees() && is_within(changed) || there.is_some_and(fits),
             };

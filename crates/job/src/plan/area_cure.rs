@@ -1,6 +1,6 @@
 //! What would bring points into the area of use of their coordinate reference system: mistakes that are usual enough to be tried.
 
-use points::{Crs, CrsKind, FileFormat, Unit};
+use points::{AreaOfUse, Crs, CrsKind, CrsTransform, DatumRule, FileFormat, Unit, utm_zone};
 
 /// The units in which a file may be, whatever its CRS.
 const UNITS: [Unit; 5] = [Unit::Metre, Unit::Foot, Unit::Other(Unit::KILOMETRE), Unit::Other(0.01), Unit::Other(0.001)];
@@ -10,6 +10,12 @@ const SCALES: [f64; 6] = [10.0, 0.1, 100.0, 0.01, 1000.0, 0.001];
 
 /// Numbers of zones stand in front of so many metres.
 const ZONE: f64 = 1e6;
+
+/// The false northing of the southern zones of UTM, in metres.
+const SOUTHERN: f64 = 1e7;
+
+/// False origins in metres of one map, the old one and the new one, which begins with whole millions: those of Switzerland.
+const RENEWED_ORIGINS: [[[f64; 2]; 2]; 1] = [[[600_000.0, 200_000.0], [2_600_000.0, 1_200_000.0]]];
 
 /// A change of all x and y of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +32,8 @@ pub(crate) enum Change {
     Unit(Unit),
     /// This is added to them.
     Moved([f64; 2]),
+    /// Their northings are those of the southern zone, which has this code and this name.
+    Southern(u32, String),
     /// These have the other sign.
     Negated([bool; 2]),
 }
@@ -47,7 +55,8 @@ pub(crate) fn changes([x, y]: [f64; 2], crs: &Crs) -> Vec<Change> {
     }
     let units = UNITS.map(Change::Unit);
     let moved = moves([x, y], crs, metres).into_iter().filter(|by| *by != [0.0; 2]).map(Change::Moved);
-    [Change::Exchanged].into_iter().chain(units).chain([Change::ExchangedNearBy]).chain(moved).chain(signs).collect()
+    let all = [Change::Exchanged].into_iter().chain(units).chain([Change::ExchangedNearBy]).chain(moved).chain(signs);
+    all.chain(southern([x, y], crs, metres)).collect()
 }
 
 /// Returns what the number of a zone or a false origin may be, if it is too much or missing.
@@ -61,12 +70,29 @@ fn moves(place: [f64; 2], crs: &Crs, metres: f64) -> Vec<[f64; 2]> {
     // Other eastings of some million metres have no number in front.
     let is_number = |value: f64| numbers_of_zone(meridian).contains(&value);
     let in_front = |value: f64| if is_number(zones(value) / ZONE) { -zones(value) } else { 0.0 };
-    let (x, y) = (in_front(place[0]), -zones(place[1]));
-    // A false origin of both that begins with whole millions.
-    let of_both = if y == 0.0 { [x, y] } else { [-zones(place[0]), y] };
+    let x = in_front(place[0]);
     let [east, north] = origin;
     let [zone_east, zone_north] = origin.map(zones);
-    vec![[x, 0.0], [0.0, north], [east, 0.0], [east, north], [zone_east, 0.0], [zone_east, zone_north], of_both]
+    let renewed = RENEWED_ORIGINS.iter().filter(|[old, _]| (*old).map(|length| length / metres) == origin);
+    let renewed = renewed.map(|[old, new]| [0, 1].map(|axis| (old[axis] - new[axis]) / metres));
+    let of_one = [[x, 0.0], [0.0, north], [east, 0.0], [east, north], [zone_east, 0.0], [zone_east, zone_north]];
+    of_one.into_iter().chain(renewed).collect()
+}
+
+/// Returns the change of a place in a northern zone of UTM that lies in the southern zone of the same meridian.
+fn southern([x, y]: [f64; 2], crs: &Crs, metres: f64) -> Option<Change> {
+    let form = crs.form()?;
+    let projection = form.projection()?;
+    let meridian = projection.value("lon_0");
+    let is_utm = projection.method() == "tmerc"
+        && projection.false_origin() == [500_000.0, 0.0]
+        && projection.value("lat_0") == 0.0
+        && (meridian + 183.0).rem_euclid(6.0) == 0.0;
+    let way = CrsTransform::to_rough_degrees(crs).ok().filter(|_| is_utm)?;
+    let degrees = way.apply([x, y - SOUTHERN / metres]).filter(|[_, latitude]| *latitude < 0.0)?;
+    let zone = utm_zone(crs, [meridian, degrees[1]], DatumRule::Strict).ok()?;
+    let is_there = AreaOfUse::of(&zone)?.beyond(degrees) == [0.0; 2];
+    is_there.then_some(Change::Southern(zone.epsg?, zone.name?))
 }
 
 /// Returns the numbers of a zone with this central meridian: of 6 degrees as UTM counts them and as from Greenwich, and of 3 degrees.
@@ -87,6 +113,7 @@ impl Change {
                 [x * factor, y * factor]
             }
             Change::Moved([east, north]) => [x + east, y + north],
+            Change::Southern(..) => [x, y - SOUTHERN / crs.metres_per_unit()?],
             Change::Negated([of_x, of_y]) => [signed(x, *of_x), signed(y, *of_y)],
         })
     }
@@ -118,6 +145,10 @@ impl Change {
                 "With {}, they lie within it: the number of a zone or a false origin is missing or too much. Name the CRS that counts as \
                  the file does with [input] crs, or move the points first",
                 moved(*by)
+            ),
+            Change::Southern(code, name) => format!(
+                "With northings that count from 10000000 at the equator, as in the southern half of the earth, they lie in the southern zone \
+                 of the same number: set [input] crs = \"EPSG:{code}\" ({name})"
             ),
             Change::Negated(signs) => format!(
                 "With the sign of {} changed, they lie within it: change it first, or say with [input] crs what the points are in",
