@@ -312,6 +312,7 @@ fn comments_that_list_columns_in_another_order_are_no_remarks() {
         "# X Y Z are in the order north east up",
         "# Northing and easting in metres, heights DHHN2016",
         "# export of a device, X (north), Y (east), Z",
+        "# column 2: x (east)\n# column 1: y (north)\n# column 3: z",
     ] {
         let error = text(&format!("{header}\n{NORTH_FIRST}")).err().unwrap_or_else(|| panic!("{header} was read"));
         let message = error.to_string();
@@ -337,6 +338,8 @@ fn remarks_are_no_headers() {
         "# north: 5933200.5, east: 565400.25, height: 14",
         "# X Y Z, north east corner",
         "# Author: Y. Nord",
+        "# exported from X for the Y district",
+        "# X Y Z (Y = north, X = east)",
     ] {
         let cloud = text(&format!("{remark}\n1.5,2,3.25\n4,5,6\n")).unwrap_or_else(|error| panic!("{remark}: {error}"));
         assert_eq!(cloud.source.min, [1.5, 2.0, 3.25], "{remark}");

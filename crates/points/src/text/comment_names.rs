@@ -1,6 +1,6 @@
 //! Names of columns in a comment before the rows, such as `# x y z`.
 
-use crate::text::column_order::doubt;
+use crate::text::column_list::doubt;
 use crate::text::decimal_comma::is_pointed;
 use crate::text::delimiter::{CANDIDATES, Delimiter};
 use crate::text::header::{ROWS_FOR_NAMES, columns_of};

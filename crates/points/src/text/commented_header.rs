@@ -1,8 +1,7 @@
 //! A comment that is a header, such as `# time, latitude, longitude, height`, but does not name x, y and z by names that are known, or
 //! lists them in another order. Without it, the first three columns would be taken for x, y and z.
 
-use crate::text::column_order::{Doubt, doubt, doubt_about_letters};
-use crate::text::column_words::{ColumnWord, Token, tokens};
+use crate::text::column_list::{Doubt, Word, doubt, doubt_about_letters, words};
 use crate::text::comment_names::texts_of;
 use crate::text::delimiter::{CANDIDATES, Delimiter};
 use crate::text::header::{ROWS_FOR_NAMES, columns_of};
@@ -120,8 +119,8 @@ fn refusal(line: &[u8], error: &str) -> String {
 fn lists_of<'a>(line: &'a [u8], marks: &[String]) -> Vec<&'a [u8]> {
     let mut texts = texts_of(line, marks);
     if let [after, whole] = texts.as_slice() {
-        let title = tokens(&whole[..whole.len() - after.len()]);
-        if title.contains(&Token::Unknown) && !title.contains(&Token::List) {
+        let title = words(&whole[..whole.len() - after.len()]);
+        if title.contains(&Word::Unknown) && !title.contains(&Word::List) {
             texts.remove(0);
         }
     }
@@ -147,14 +146,14 @@ fn header_doubt(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> Opt
     }
     let is_word = |field: &&[u8]| !Name::read(field).has_blanks();
     let are_words = delimiter != Delimiter::Blank && fields.iter().all(is_word);
-    let fields: Vec<(bool, Vec<Token>)> = fields.iter().map(|field| (is_word(field), tokens(field))).collect();
-    let count = |wanted: fn(bool, &[Token]) -> bool| fields.iter().filter(|(word, field)| wanted(*word, field)).count();
+    let fields: Vec<(bool, Vec<Word>)> = fields.iter().map(|field| (is_word(field), words(field))).collect();
+    let count = |wanted: fn(bool, &[Word]) -> bool| fields.iter().filter(|(word, field)| wanted(*word, field)).count();
     if count(|_, field| gives_value(field)) > 0 {
         // "north: 5933000, east: 565000"
         return None;
     }
     let known = count(|is_word, field| names_column(field) && (is_word || is_column(field)));
-    let is_kind = |kind: fn(&[Token]) -> bool| fields.iter().any(|(_, field)| kind(field));
+    let is_kind = |kind: fn(&[Word]) -> bool| fields.iter().any(|(_, field)| kind(field));
     let kinds = [
         is_kind(|field| names_axis(field, 0)),
         is_kind(|field| names_axis(field, 1)),
@@ -166,32 +165,32 @@ fn header_doubt(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> Opt
     if are_known && (is_as_wide || is_long) || is_as_wide && are_words && known > 0 {
         return Some(Doubt::Certain);
     }
-    let has_unknown = count(|_, field| field.contains(&Token::Unknown)) > 0;
+    let has_unknown = count(|_, field| field.contains(&Word::Unknown)) > 0;
     (is_as_wide && are_words && has_unknown).then_some(Doubt::Possible)
 }
 
 /// Returns whether a field gives the value of what it names, and not the place of a column.
-fn gives_value(tokens: &[Token]) -> bool {
-    let is_number = |token: &Token| matches!(token, Token::Value | Token::Place(_));
-    names_column(tokens) && !tokens.contains(&Token::List) && tokens.iter().any(is_number)
+fn gives_value(field: &[Word]) -> bool {
+    let is_number = |word: &Word| matches!(word, Word::Value | Word::Place(_));
+    names_column(field) && !field.contains(&Word::List) && field.iter().any(is_number)
 }
 
-fn names_column(tokens: &[Token]) -> bool {
-    tokens.iter().any(|token| matches!(token, Token::Column(_)))
+fn names_column(field: &[Word]) -> bool {
+    field.iter().any(|word| matches!(word, Word::Axis(..) | Word::Other))
 }
 
-fn names_axis(tokens: &[Token], axis: usize) -> bool {
-    tokens.iter().any(|token| matches!(token, Token::Column(word) if word.axis() == Some(axis)))
+fn names_axis(field: &[Word], axis: usize) -> bool {
+    field.iter().any(|word| matches!(word, Word::Axis(own, _) if *own == axis))
 }
 
 /// Returns whether a field names something else than an axis.
-fn names_other(tokens: &[Token]) -> bool {
-    tokens.iter().any(|token| matches!(token, Token::Column(ColumnWord::Other)))
+fn names_other(field: &[Word]) -> bool {
+    field.contains(&Word::Other)
 }
 
 /// Returns whether a field names a column, and not a thing that lies north of another.
-fn is_column(tokens: &[Token]) -> bool {
-    names_column(tokens) && !tokens.iter().any(|token| matches!(token, Token::Unknown | Token::Stop))
+fn is_column(field: &[Word]) -> bool {
+    names_column(field) && !field.iter().any(|word| matches!(word, Word::Unknown | Word::Stop))
 }
 
 /// Returns whether the first words of the fields are x, y and z, in a sentence such as "x, y, z in metres".
