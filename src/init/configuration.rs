@@ -4,9 +4,10 @@ use crate::init::draft::{Draft, NeededLine, quoted};
 use crate::init::findings::{Findings, NO_UNIT_OF_HEIGHTS, rectangle, unit_of_heights};
 use crate::init::page::Page;
 use crate::init::required_options::Runnable;
+use crs::Unit;
 use job::plan::job_plan::Plan;
 use job::preflight::check::Preflight;
-use points::{Source, Unit};
+use points::Source;
 use tiles::page::is_built_in;
 
 /// What every configuration begins with that `init` writes.

@@ -1,11 +1,12 @@
 //! What was found about the clouds, in sentences for a configuration.
 
 use crate::init::draft::Draft;
+use crs::{Crs, Unit};
 use job::plan::job_plan::Plan;
 use job::preflight::check::Preflight;
 use job::progress::number_text::{grouped, mebibytes};
 use points::surface_warnings::listed;
-use points::{Crs, FileFormat, Source, Unit};
+use points::{FileFormat, Source};
 
 /// The most systems that a sentence names.
 const MOST_NAMED: usize = 3;

@@ -1,8 +1,9 @@
 //! What lets a job run though its clouds are in degrees or in different coordinate reference systems.
 
 use crate::init::draft::{Draft, NeededLine};
+use crs::{Crs, Unit};
 use job::plan::inputs::input_paths;
-use points::{Crs, FileFormat, Source, Unit};
+use points::{FileFormat, Source};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use sys::{Error, Result};

@@ -1,6 +1,7 @@
 //! The layouts of texts that programs write: names of columns, lines before them, delimiters, colours.
 
-use points::{Point, TextOptions, Unit, open};
+use crs::Unit;
+use points::{Point, TextOptions, open};
 use sys::Result;
 
 use crate::cloud::{Cloud, file, read_bytes};

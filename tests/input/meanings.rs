@@ -1,6 +1,7 @@
 //! Texts that look like something else: decimal commas, directions and units in brackets, degrees, colours, apostrophes.
 
-use points::{TextOptions, Unit, open};
+use crs::Unit;
+use points::{TextOptions, open};
 
 use crate::cloud::file;
 use crate::first_warning;

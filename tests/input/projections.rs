@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use points::{Crs, CrsTransform, DatumRule, NamedCrs};
+use crs::{Crs, CrsTransform, DatumRule, NamedCrs};
 
 /// The codes of longitude and latitude and of the map, and the area: west, south, east, north.
 const MAPS: [(u32, u32, [f64; 4]); 26] = [

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use points::{Point, PointCounts, TextOptions, Unit, open};
+use crs::Unit;
+use points::{Point, PointCounts, TextOptions, open};
 use rayon::prelude::*;
 
 use crate::cloud::{Cloud, lattice, read, rules};

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use points::{Crs, CrsTransform, DatumRule, NamedCrs};
+use crs::{Crs, CrsTransform, DatumRule, NamedCrs};
 
 use crate::coordinate_systems::{add_records, code, keys, text, warnings};
 use crate::program::{Job, gdt_batch, number};

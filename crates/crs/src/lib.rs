@@ -32,3 +32,18 @@ pub mod transform;
 pub mod unit;
 pub mod vertical;
 pub(crate) mod wkt;
+
+pub use area_of_use::{AreaOfUse, arc};
+pub use choice::CrsChoice;
+pub use datum::Sameness;
+pub use rectangle::turned;
+pub use system::{ComparableCrs, Crs, CrsKind};
+pub use target::{NamedCrs, TargetCrs};
+pub use transform::between::CrsTransform;
+pub use transform::between::DatumNote;
+pub use transform::datum_rule::DatumRule;
+pub use transform::to_globe::GlobeWay;
+pub use transform::utm::utm_zone;
+pub use unit::Unit;
+pub use unit::same_length;
+pub use vertical::VerticalSystem;

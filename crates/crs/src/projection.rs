@@ -132,7 +132,7 @@ impl Projection {
     }
 
     /// Returns the name of the method in PROJ.4, or one of that kind.
-    pub(crate) fn method(&self) -> &str {
+    pub fn method(&self) -> &str {
         &self.method
     }
 

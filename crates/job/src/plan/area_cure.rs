@@ -1,6 +1,7 @@
 //! What would bring points into the area of use of their coordinate reference system: mistakes that are usual enough to be tried.
 
-use points::{AreaOfUse, Crs, CrsKind, CrsTransform, DatumRule, FileFormat, Unit, utm_zone};
+use crs::{AreaOfUse, Crs, CrsKind, CrsTransform, DatumRule, Unit, utm_zone};
+use points::FileFormat;
 
 /// The units in which a file may be, whatever its CRS.
 const UNITS: [Unit; 5] = [Unit::Metre, Unit::Foot, Unit::Other(Unit::KILOMETRE), Unit::Other(0.01), Unit::Other(0.001)];

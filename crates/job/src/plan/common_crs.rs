@@ -1,8 +1,9 @@
 //! The CRS and the units that all inputs of a job have in common.
 
 use crate::plan::distinct_crs::DistinctCrs;
+use crs::{ComparableCrs, Crs, CrsChoice, Unit, same_length};
 use points::options::UnitChoice;
-use points::{ComparableCrs, Crs, CrsChoice, FileFormat, Source, Unit, same_length};
+use points::{FileFormat, Source};
 use std::borrow::Cow;
 use sys::{Error, Result, Warnings};
 

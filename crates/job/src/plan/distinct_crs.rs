@@ -1,6 +1,6 @@
 //! The different coordinate systems among the inputs, and whether any two of them contradict each other.
 
-use points::{ComparableCrs, Crs};
+use crs::{ComparableCrs, Crs};
 use std::collections::{HashMap, HashSet};
 use sys::{Result, interrupt};
 
@@ -69,7 +69,7 @@ impl<'a> DistinctCrs<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use points::CrsChoice;
+    use crs::CrsChoice;
 
     fn utm(name: &str, meridian: u32) -> Crs {
         let text = format!(

@@ -1,8 +1,9 @@
 //! Coordinates that count from the middle of the earth: their z is no height, and there is no terrain of them before they are transformed.
 
 use crate::plan::common_crs::TRANSFORM;
+use crs::{Crs, CrsChoice, CrsKind};
 use points::options::InputOptions;
-use points::{Crs, CrsChoice, CrsKind, FileFormat, Source};
+use points::{FileFormat, Source};
 use sys::{Error, Result, Warnings};
 
 /// Checks that no source is in a geocentric system, as its record or the user states.

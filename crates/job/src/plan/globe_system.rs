@@ -1,6 +1,6 @@
 //! The projected system of a job, from which its terrain can be placed on the globe.
 
-use points::{Crs, GlobeWay};
+use crs::{Crs, GlobeWay};
 use tiles::tiles3d::globe::GlobeSystem;
 
 /// Returns the system of `crs`, with coordinates in units of `metres`, and its way to the globe.

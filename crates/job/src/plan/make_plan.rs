@@ -23,13 +23,14 @@ use crate::plan::text_inputs::{
     refuse_missing_returns, row_choice, wanted_fields,
 };
 use crate::plan::zero_points::refuse_zero_points;
+use crs::CrsChoice;
 use delaunay::geometry::Bounds;
 use delaunay::geometry::REACH;
 use lattice::{AxisMap, Lattice, shortest_decimal};
 use points::options::{OnBadFile, UnitChoice};
 use points::surface_warnings::no_ground;
 use points::transform_sources::transform_sources;
-use points::{Axis, CrsChoice, FileFormat, PointCounts, PointRules, Source, set_network_memory};
+use points::{Axis, FileFormat, PointCounts, PointRules, Source, set_network_memory};
 use rayon::prelude::*;
 use rust_decimal::prelude::ToPrimitive;
 use sys::{Error, Result, Warnings};

@@ -1,8 +1,9 @@
 //! `[input] unit` must not contradict the coordinate reference system: coordinates would be taken as lengths that the system does not have,
 //! and the terrain would be placed far from where it is.
 
+use crs::{Crs, CrsChoice, Unit, same_length};
 use points::options::InputOptions;
-use points::{Crs, CrsChoice, FileFormat, Source, Unit, same_length};
+use points::{FileFormat, Source};
 use sys::{Error, Result, Warnings};
 
 /// Checks that the unit of x and y that the user names is that of the system of every source.

@@ -4,13 +4,11 @@ use crate::options::JobOptions;
 use crate::plan::extent::Extent;
 use crate::plan::height_range::HeightSample;
 use crate::plan::job_plan::Plan;
+use crs::{CrsChoice, CrsKind, Unit};
 use points::options::{InputOptions, OnBadFile, UnitChoice};
 use points::surface::Surface;
 use points::surface_warnings::no_column_of_classes;
-use points::{
-    CrsChoice, CrsKind, FileFormat, KeptReturns, OptionalFields, PointCounts, PointRules, RowChoice, Source,
-    TextReading, Unit,
-};
+use points::{FileFormat, KeptReturns, OptionalFields, PointCounts, PointRules, RowChoice, Source, TextReading};
 use rayon::prelude::*;
 use sys::{Error, Result, interrupt};
 

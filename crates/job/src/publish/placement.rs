@@ -2,9 +2,9 @@
 
 use crate::plan::globe_system::globe_system;
 use crate::tiles::curve::{ONE_TRANSFORM, ONE_TRANSFORM_SIDEWAYS};
+use crs::Crs;
 use crs::geoid::Geoid;
 use crs::geoid::option::HeightOffset;
-use points::Crs;
 use rayon::prelude::*;
 use serde::Serialize;
 use tiles::curvature::Curvature;

@@ -1,9 +1,9 @@
 //! Lines come in the coordinate reference system of the points, or are transformed into it, or are refused. Their heights come in the unit
 //! of the points' heights.
 
+use crs::{Crs, CrsKind, CrsTransform, DatumNote, DatumRule, Sameness, Unit, same_length};
 use points::lines::LineFile;
 use points::lines::options::{LineCrs, LineHeights, LineOptions};
-use points::{Crs, CrsKind, CrsTransform, DatumNote, DatumRule, Sameness, Unit, same_length};
 use sys::{Error, Result};
 
 /// What the points of a job are in.
@@ -187,7 +187,7 @@ fn other_system(file: &LineFile, own: &Crs, points: &Crs, why: &str) -> Error {
 mod tests {
     use super::*;
     use breaklines::FeatureKind;
-    use points::CrsChoice;
+    use crs::CrsChoice;
     use points::lines::{LineFeature, LineShape};
     use sys::Warnings;
 

@@ -193,7 +193,7 @@ fn check_size(paths: &[(&LineOptions, PathBuf)], memory: u64) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use points::Crs;
+    use crs::Crs;
     use points::lines::LineShape;
 
     fn extended(kind: FeatureKind, heights: [f64; 4]) -> Result<[f64; 2]> {

@@ -99,7 +99,7 @@ fn banks(mut ring: Vec<Vertex>) -> Vec<Vec<Vertex>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use points::Crs;
+    use crs::Crs;
     use rust_decimal::Decimal;
     use sys::Warnings;
 

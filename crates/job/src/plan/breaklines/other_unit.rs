@@ -2,7 +2,7 @@
 
 use crate::plan::breaklines::terrain::{Around, Pair, SampledTerrain, median, middles};
 use breaklines::Feature;
-use points::Unit;
+use crs::Unit;
 
 /// Heights of a file in another unit are so many times nearer to the terrain when they are converted, and were farther from it than so many
 /// metres, or fewer where they rise and fall with it.

@@ -1,7 +1,7 @@
 //! What a raster says of the job's coordinate reference system.
 
 use crate::plan::job_plan::Plan;
-use points::Crs;
+use crs::Crs;
 use tiles::raster::geokeys::RasterSystem;
 
 /// Returns what the raster of a job says of its system.
