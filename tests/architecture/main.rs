@@ -55,7 +55,8 @@ fn borrowed(files: &BTreeMap<String, String>) -> impl Iterator<Item = (&str, &st
 #[test]
 fn the_sources_keep_the_rules() {
     let folders = folders();
-    assert!(folders.len() == 10, "{folders:?}");
+    let has = |name: &str| folders.iter().any(|of| of == Path::new(name));
+    assert!(["src", "crates/job/src", "crates/delaunay/src"].into_iter().all(has), "{folders:?}");
     for of in folders {
         let broken = broken_in(of.to_str().unwrap(), borrowed(&real_files(&of)));
         assert!(broken.is_empty(), "{} broken rules:\n{}", broken.len(), broken.join("\n"));

@@ -3,7 +3,8 @@
 //! [`open()`] looks at one file and returns a [`Source`]. Its chunks are decoded independently, on any thread. Every record passes
 //! the filter, which applies the [`PointRules`], and [`PointCounts`] says what happened to the records.
 //!
-//! A new file format is a module of its own beside `las` and `text`, and a variant of `PointData` in `source.rs`.
+//! A new file format is a module of its own beside `las` and `text`, which implements `PointFormat` (`point_format.rs`), and a variant of
+//! `PointData` in `source.rs`.
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
@@ -17,6 +18,7 @@ mod measured;
 mod middle_zone;
 pub mod options;
 mod other_formats;
+pub(crate) mod point_format;
 mod points;
 mod read_ahead;
 mod remote;

@@ -16,6 +16,7 @@ use crate::las::uncompressed::UncompressedPoints;
 use crate::las::vlr;
 use crate::measured::{MeasuredPoints, PlausiblePoints};
 use crate::other_formats::refuse_other_formats;
+use crate::point_format::PointFormat;
 use crate::points::axis::Axis;
 use crate::points::chunk_request::ChunkRequest;
 use crate::points::counts::PointCounts;
@@ -126,6 +127,45 @@ enum PointData {
     Las(UncompressedPoints),
     Laz(CompressedPoints),
     Text(Box<TextTable>),
+}
+
+/// Asks the format of a [`PointData`].
+macro_rules! ask {
+    ($data:expr, $points:ident => $answer:expr) => {
+        match $data {
+            PointData::Las($points) => $answer,
+            PointData::Laz($points) => $answer,
+            PointData::Text($points) => $answer,
+        }
+    };
+}
+
+impl PointFormat for PointData {
+    fn chunk_count(&self) -> usize {
+        ask!(self, points => points.chunk_count())
+    }
+
+    fn bytes_of(&self, chunk: usize, request: &ChunkRequest, size: u64) -> Vec<Range<u64>> {
+        ask!(self, points => points.bytes_of(chunk, request, size))
+    }
+
+    fn decode(
+        &self,
+        file: &RandomAccessFile,
+        chunk: usize,
+        request: ChunkRequest,
+        sink: &mut impl RecordSink,
+    ) -> Result<()> {
+        ask!(self, points => points.decode(file, chunk, request, sink))
+    }
+
+    fn has_index(&self) -> bool {
+        ask!(self, points => points.has_index())
+    }
+
+    fn decoded_records(&self, chunk: usize, bounds: Option<&RawBounds>) -> Option<u64> {
+        ask!(self, points => points.decoded_records(chunk, bounds))
+    }
 }
 
 /// Opens the file at `path` and finds out what it holds. Reads the header of LAS or LAZ, or all of a text once, on the threads of
@@ -408,11 +448,7 @@ impl Source {
     ///
     /// For LAZ, a chunk of the source is one chunk of the file, or a run of several if those are small.
     pub fn chunks(&self) -> usize {
-        match &self.points {
-            PointData::Las(points) => points.chunk_count(),
-            PointData::Laz(points) => points.chunk_count(),
-            PointData::Text(table) => table.chunk_count(),
-        }
+        self.points.chunk_count()
     }
 
     /// Decodes chunk `chunk` (below [`Source::chunks`]) and hands the points that pass `rules` to `sink` in record order, at
@@ -482,12 +518,11 @@ impl Source {
     /// Without an index that is all.
     pub fn decoded_chunks(&self, bounds: Option<&RawBounds>) -> DecodedChunks {
         let bounds = self.own_bounds(bounds);
-        match &self.points {
-            PointData::Laz(points) if bounds.is_some() && points.has_index() => {
-                DecodedChunks::listed((0..points.chunk_count()).map(|chunk| points.decoded_records(chunk, bounds)))
-            }
-            _ => DecodedChunks::all(self.chunks(), self.records - self.missing),
+        if bounds.is_none() || !self.has_index() {
+            return DecodedChunks::all(self.chunks(), self.records - self.missing);
         }
+        let records = |chunk: usize| self.points.decoded_records(chunk, bounds).unwrap_or(0);
+        DecodedChunks::listed((0..self.chunks()).map(records))
     }
 
     /// Sends what is wanted of a chunk to `sink`; of a text about as many records.
@@ -503,7 +538,7 @@ impl Source {
 
     /// Returns whether an index of the file tells where its points lie.
     pub fn has_index(&self) -> bool {
-        matches!(&self.points, PointData::Laz(points) if points.has_index())
+        self.points.has_index()
     }
 
     /// Returns the bounds for an index of the file: none if they are in another system than the file.
@@ -513,12 +548,7 @@ impl Source {
 
     /// Returns the bytes of a chunk that are best read at once for this request, in their order.
     pub(crate) fn bytes_of(&self, chunk: usize, request: &ChunkRequest) -> Vec<Range<u64>> {
-        match &self.points {
-            PointData::Laz(points) => points.bytes_of(chunk, request),
-            _ if request.left_out || request.records < u64::MAX => Vec::new(),
-            PointData::Las(points) => vec![points.bytes_of(chunk)],
-            PointData::Text(table) => vec![table.bytes_of(chunk, self.size)],
-        }
+        self.points.bytes_of(chunk, request, self.size)
     }
 
     /// As [`Source::read_chunk`], in the coordinates of the file.
@@ -537,11 +567,6 @@ impl Source {
             let records = if self.has_index() && request.bounds.is_some() { u64::MAX } else { request.records };
             file.hold(self.bytes_of(chunk, &ChunkRequest { records, ..request }).into_iter())?;
         }
-        match &self.points {
-            PointData::Las(points) => points.decode(&file, chunk, request, sink),
-            PointData::Laz(points) => points.decode(&file, chunk, request, sink),
-            PointData::Text(_) if request.left_out => Ok(()),
-            PointData::Text(table) => table.decode(&file, chunk, request.records, sink),
-        }
+        self.points.decode(&file, chunk, request, sink)
     }
 }

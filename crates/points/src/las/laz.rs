@@ -1,5 +1,6 @@
 //! Compressed point records: LASzip chunks, pointwise and layered, each decoded from its own bytes.
 
+use crate::point_format::PointFormat;
 use std::ops::Range;
 
 use laz::LazVlr;
@@ -74,25 +75,36 @@ impl CompressedPoints {
         self.chunks.iter().flatten().any(|chunk| chunk.restart.is_some())
     }
 
-    /// Returns the number of chunks of the source. There is at least one if records are missing, so that decoding counts them.
-    pub(crate) fn chunk_count(&self) -> usize {
+    /// Returns what the points of a LAZ chunk lie within, if the index tells and bounds make it matter.
+    fn cell(&self, laz_chunk: &LazChunk, bounds: Option<&RawBounds>) -> Option<RawBounds> {
+        self.index.as_ref().filter(|_| bounds.is_some())?.cell(laz_chunk)
+    }
+
+    fn may_reach(&self, laz_chunk: &LazChunk, bounds: Option<&RawBounds>) -> bool {
+        let cell = self.cell(laz_chunk, bounds);
+        cell.zip(bounds).is_none_or(|(cell, bounds)| cell.meet(bounds))
+    }
+}
+
+impl PointFormat for CompressedPoints {
+    fn chunk_count(&self) -> usize {
         self.chunks.len().max((self.missing > 0) as usize)
     }
 
-    /// Returns whether it is known where the points of each LAZ chunk lie.
-    pub(crate) fn has_index(&self) -> bool {
+    fn has_index(&self) -> bool {
         self.index.is_some()
     }
 
-    /// Returns the number of records of chunk `chunk` of the source that are decoded for these bounds.
-    pub(crate) fn decoded_records(&self, chunk: usize, bounds: Option<&RawBounds>) -> u64 {
+    fn decoded_records(&self, chunk: usize, bounds: Option<&RawBounds>) -> Option<u64> {
+        self.index.as_ref()?;
         let laz_chunks = self.chunks.get(chunk).into_iter().flatten();
-        laz_chunks.filter(|laz_chunk| self.may_reach(laz_chunk, bounds)).map(|laz_chunk| laz_chunk.count).sum()
+        let records =
+            laz_chunks.filter(|laz_chunk| self.may_reach(laz_chunk, bounds)).map(|laz_chunk| laz_chunk.count).sum();
+        Some(records)
     }
 
-    /// Returns the bytes of the LAZ chunks that this request needs whole of chunk `chunk` of the source. Of pointwise ones only all records
-    /// do.
-    pub(crate) fn bytes_of(&self, chunk: usize, request: &ChunkRequest) -> Vec<Range<u64>> {
+    /// Of pointwise chunks, only requests for all records need them whole.
+    fn bytes_of(&self, chunk: usize, request: &ChunkRequest, _: u64) -> Vec<Range<u64>> {
         let laz_chunks = self.chunks.get(chunk).into_iter().flatten();
         let decoded = laz_chunks.filter(|laz_chunk| self.may_reach(laz_chunk, request.bounds) != request.left_out);
         let mut left = request.records;
@@ -104,18 +116,7 @@ impl CompressedPoints {
         decoded.filter(|laz_chunk| is_needed(laz_chunk)).map(|laz_chunk| laz_chunk.bytes.clone()).collect()
     }
 
-    /// Returns what the points of a LAZ chunk lie within, if the index tells and bounds make it matter.
-    fn cell(&self, laz_chunk: &LazChunk, bounds: Option<&RawBounds>) -> Option<RawBounds> {
-        self.index.as_ref().filter(|_| bounds.is_some())?.cell(laz_chunk)
-    }
-
-    fn may_reach(&self, laz_chunk: &LazChunk, bounds: Option<&RawBounds>) -> bool {
-        let cell = self.cell(laz_chunk, bounds);
-        cell.zip(bounds).is_none_or(|(cell, bounds)| cell.meet(bounds))
-    }
-
-    /// Sends the wanted records of chunk `chunk` of the source through `filter`.
-    pub(crate) fn decode(
+    fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,

@@ -1,5 +1,6 @@
 //! Uncompressed point records, read block by block.
 
+use crate::point_format::PointFormat;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
@@ -40,20 +41,29 @@ impl UncompressedPoints {
         UncompressedPoints { layout, points_at: header.points_at, whole, missing: header.records - whole }
     }
 
-    /// Returns the number of chunks. There is at least one if records are missing, so that decoding counts them.
-    pub(crate) fn chunk_count(&self) -> usize {
+    fn records_of(&self, chunk: usize) -> Range<u64> {
+        let first = chunk as u64 * CHUNK;
+        first..(first + CHUNK).min(self.whole)
+    }
+}
+
+impl PointFormat for UncompressedPoints {
+    fn chunk_count(&self) -> usize {
         (self.whole.div_ceil(CHUNK) as usize).max((self.missing > 0) as usize)
     }
 
-    /// Returns the bytes of a chunk.
-    pub(crate) fn bytes_of(&self, chunk: usize) -> Range<u64> {
+    fn bytes_of(&self, chunk: usize, request: &ChunkRequest, _: u64) -> Vec<Range<u64>> {
+        if !request.needs_whole_chunk() {
+            return Vec::new();
+        }
         let Range { start, end } = self.records_of(chunk);
         let at = |number: u64| self.points_at + number * self.layout.length as u64;
-        at(start)..at(end)
+        let bytes = at(start)..at(end);
+        vec![bytes]
     }
 
-    /// Sends the wanted records of `chunk` through `filter`. There is no index that could leave any out.
-    pub(crate) fn decode(
+    /// There is no index that could leave any records out.
+    fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
@@ -85,11 +95,6 @@ impl UncompressedPoints {
             });
         }
         Ok(())
-    }
-
-    fn records_of(&self, chunk: usize) -> Range<u64> {
-        let first = chunk as u64 * CHUNK;
-        first..(first + CHUNK).min(self.whole)
     }
 }
 

@@ -21,4 +21,9 @@ impl ChunkRequest<'_> {
     pub(crate) fn all() -> ChunkRequest<'static> {
         ChunkRequest { records: u64::MAX, fields: OptionalFields::default(), bounds: None, left_out: false }
     }
+
+    /// Tells whether a file without an index has to read the chunk from its beginning to its end.
+    pub(crate) fn needs_whole_chunk(&self) -> bool {
+        !self.left_out && self.records == u64::MAX
+    }
 }

@@ -1,5 +1,7 @@
 //! A text after the first pass over it; its rows are decoded as records.
 
+use crate::point_format::PointFormat;
+use crate::points::chunk_request::ChunkRequest;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -400,24 +402,38 @@ impl TextTable {
         self.columns.have(ColumnRole::Class)
     }
 
-    /// Returns the number of chunks.
-    pub(crate) fn chunk_count(&self) -> usize {
+    /// Returns the bytes of a chunk in which about its first `records` rows begin: all of them, or as many as these take if all rows
+    /// are as long.
+    fn start_of(&self, chunk: usize, records: u64) -> Range<u64> {
+        let Range { start, end } = chunk_range(&self.rows, chunk as u64);
+        let next = self.chunks.get(chunk + 1).map_or(self.records, |next| next.row);
+        let rows = next - self.chunks[chunk].row;
+        let bytes = (end - start) as u128 * records.min(rows) as u128 / rows.max(1) as u128;
+        if records < rows { start..start + bytes as u64 } else { start..end }
+    }
+}
+
+impl PointFormat for TextTable {
+    fn chunk_count(&self) -> usize {
         self.chunks.len()
     }
 
-    /// Returns the bytes that a chunk is decoded from, of a file of `size` bytes.
-    pub(crate) fn bytes_of(&self, chunk: usize, size: u64) -> Range<u64> {
-        bytes_around(self.rows.start, &chunk_range(&self.rows, chunk as u64), size)
+    fn bytes_of(&self, chunk: usize, request: &ChunkRequest, size: u64) -> Vec<Range<u64>> {
+        let bytes = || bytes_around(self.rows.start, &chunk_range(&self.rows, chunk as u64), size);
+        if request.needs_whole_chunk() { vec![bytes()] } else { Vec::new() }
     }
 
-    /// Sends about the first `records` rows of `chunk` through `filter`.
-    pub(crate) fn decode(
+    /// Of a request for some records it sends about as many, from the first on.
+    fn decode(
         &self,
         file: &RandomAccessFile,
         chunk: usize,
-        records: u64,
+        request: ChunkRequest,
         filter: &mut impl RecordSink,
     ) -> Result<()> {
+        if request.left_out {
+            return Ok(());
+        }
         let ChunkStart { mut row, line: first_line } = self.chunks[chunk];
         let WantedRows { bounds, ref decimals, .. } = *self.held();
         let within = bounds.filter(|_| self.without_outliers.is_some());
@@ -428,7 +444,7 @@ impl TextTable {
         };
         let mut explained = self.first_outlier_in != Some(chunk);
         let whole = chunk_range(&self.rows, chunk as u64);
-        let range = self.start_of(chunk, records);
+        let range = self.start_of(chunk, request.records);
         let is_whole = range == whole;
         for_each_line(file, self.rows.start, range, |index, line| {
             let number = || first_line + index;
@@ -464,16 +480,6 @@ impl TextTable {
                 .malformed(self.missing, || format!("{} rows are missing that the first line promises", self.missing));
         }
         Ok(())
-    }
-
-    /// Returns the bytes of a chunk in which about its first `records` rows begin: all of them, or as many as these take if all rows
-    /// are as long.
-    fn start_of(&self, chunk: usize, records: u64) -> Range<u64> {
-        let Range { start, end } = chunk_range(&self.rows, chunk as u64);
-        let next = self.chunks.get(chunk + 1).map_or(self.records, |next| next.row);
-        let rows = next - self.chunks[chunk].row;
-        let bytes = (end - start) as u128 * records.min(rows) as u128 / rows.max(1) as u128;
-        if records < rows { start..start + bytes as u64 } else { start..end }
     }
 }
 
