@@ -43,7 +43,8 @@ fn sources_that_pages_for_developers_name_are_there() {
     let mut checked = 0;
     for page in developers_pages() {
         for name in page.code().into_iter().filter(|code| code.ends_with(".rs") && !code.contains(' ')) {
-            let is_there = files.iter().any(|file| format!("/{file}").ends_with(&format!("/{name}")));
+            let end = format!("/{}", short(name.to_string()));
+            let is_there = files.iter().any(|file| format!("/{file}").ends_with(&end));
             assert!(is_there, "{}: there is no {name}", page.path.display());
             checked += 1;
         }
