@@ -17,4 +17,4 @@ mod placed;
 mod predicates;
 mod random;
 mod rig;
-mod twins;
+mod reference_kernels;
