@@ -53,7 +53,7 @@ impl Comments<'_> {
     /// names that are known. If `has_words`, one begins with x, y and z.
     pub(crate) fn unread_header(&self, has_words: bool) -> Option<UnreadHeader> {
         if let Some(line) = self.contradicted_bounds() {
-            let what = "bounds x, y and z, and none of the first rows lies within it if its first three columns are x, y and z";
+            let what = "bounds x, y and z, and other columns than the first three lie within these bounds";
             return Some(UnreadHeader::Certain(format!("the comment {} {what}: {REMEDY}", shown(line))));
         }
         let list = if has_words { None } else { self.unread_list() };
@@ -111,19 +111,25 @@ impl Comments<'_> {
         self.readings().map(|(own, row)| columns_of(own, row)).collect()
     }
 
-    /// Returns a comment with the least or the greatest x, y and z, beyond which the first three columns of all first rows lie.
+    /// Returns a comment with the least or the greatest x, y and z, beyond which the first three columns of all first rows lie, where others lie
+    /// within. Some programs write bounds that are no bounds of the rows.
     fn contradicted_bounds(&self) -> Option<&[u8]> {
-        let place = |(own, row): (Delimiter, &[u8])| -> Option<[f64; 3]> {
-            let fields = own.fields(row);
-            let numbers = fields.iter().take(3).map_while(|field| Some(Number::parse(field)?.value()));
-            numbers.collect::<Vec<f64>>().try_into().ok()
+        let numbers = |(own, row): (Delimiter, &[u8])| -> Vec<f64> {
+            own.fields(row).iter().map_while(|field| Some(Number::parse(field)?.value())).collect()
         };
-        let places: Vec<[f64; 3]> = self.readings().filter_map(place).collect();
-        let is_contradicted = |text: &[u8]| {
-            let bounds = AxisValues::read(text).filter(|_| !places.is_empty());
-            bounds.is_some_and(|bounds| places.iter().all(|place| bounds.exclude(*place)))
-        };
-        self.texts().find(|(_, text)| is_contradicted(text)).map(|(line, _)| line)
+        let rows: Vec<Vec<f64>> = self.readings().map(numbers).collect();
+        let columns = rows.iter().map(Vec::len).min()?;
+        let bounds: Vec<(&[u8], AxisValues)> =
+            self.texts().filter_map(|(line, text)| Some((line, AxisValues::read(text)?))).collect();
+        let exclude =
+            |bounds: &AxisValues, row: &[f64], [x, y, z]: [usize; 3]| bounds.exclude([row[x], row[y], row[z]]);
+        let mut windows = (2..columns).map(|last| [last - 2, last - 1, last]);
+        let first = windows.next()?;
+        let (line, _) = bounds.iter().find(|(_, bounds)| rows.iter().all(|row| exclude(bounds, row, first)))?;
+        let lie_within =
+            |order: [usize; 3]| rows.iter().all(|row| bounds.iter().all(|(_, bounds)| !exclude(bounds, row, order)));
+        let is_other = lie_within([1, 0, 2]) || windows.any(|[x, y, z]| lie_within([x, y, z]) || lie_within([y, x, z]));
+        is_other.then_some(*line)
     }
 
     /// Returns the last comment that is a list of names, and what is wrong with them.
@@ -339,7 +345,12 @@ mod tests {
             );
             assert_eq!(unread(comment, "556800.33 5423136.67 124.84 400000.0"), None);
         }
-        assert_eq!(unread("# offset x y z: 500000 5000000 0", row), None);
+        let exchanged = unread("# max x y z: 557098.32 5423398.72 141.06", "5423136.67 556800.33 124.84");
+        assert!(matches!(exchanged, Some(UnreadHeader::Certain(_))));
+        // Bounds that were never written, or before a shift, are those of no column.
+        for comment in ["# offset x y z: 500000 5000000 0", "# max x y z: 0 0 0", "# min x y z: 9e6 9e6 9e6"] {
+            assert_eq!(unread(comment, row), None, "{comment}");
+        }
     }
 
     #[test]
