@@ -396,3 +396,27 @@ fn a_text_whose_unit_contradicts_its_code_is_judged_by_the_area_of_the_code() {
         serde_json::from_slice(&fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
     assert!(place["epsg"].is_null() && place["crs"].is_string(), "{place}");
 }
+
+#[test]
+fn a_file_without_a_crs_beside_others_is_told_so_and_the_cure_helps() {
+    let folder = tempfile::tempdir().unwrap();
+    let named = las(&folder, "named.las", PLACE);
+    let assumed = "it names no CRS, and is taken to be in that of the other files: in ETRS89 / UTM zone 32N (EPSG:25832), its points";
+    for (name, place, missing) in [
+        ("prefixed.las", [32_500_010.0, 5_500_010.0], "EPSG:4647"),
+        ("nowhere.las", [50_000_000.0, 5_500_000.0], "EPSG:..."),
+    ] {
+        let file = write(folder.path(), name, &[]);
+        move_to(&file, [place[0], place[1], 0.0]);
+        let remedy = format!("missing_crs = \"{missing}\", together with to_crs = \"EPSG:25832\"");
+        let refused = Job::on(&[&named, &file]).run();
+        refused.refused(3, &[name, assumed, &remedy]);
+        assert!(!refused.err.contains("[input] crs"), "{name}");
+        // Alone it has no CRS, and a file that names one is told as before.
+        Job::on(&[&file]).report();
+    }
+    let file = folder.path().join("prefixed.las");
+    let cured = "missing_crs = \"EPSG:4647\"\nto_crs = \"EPSG:25832\"";
+    let said = warnings(&Job::on(&[&named, &file]).with("input", cured).report());
+    assert!(!said.contains("area of use"), "{said}");
+}

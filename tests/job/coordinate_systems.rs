@@ -110,13 +110,16 @@ fn the_cure_of_a_geocentric_system_is_one_that_helps() {
         Job::on(&[&bare, &map]).with("input", line).run().refused(2, &[words[0], words[1], key]);
     }
     // The user states a CRS already, or the other file does.
-    for (files, line) in [(vec![&false_record], "crs = \"EPSG:26915\""), (vec![&false_record, &map], "")] {
+    let full = "The record is ignored: unless [input] crs, missing_crs or another file states";
+    let short = "its record of a geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored: [input] states";
+    for (files, line, words) in [
+        (vec![&false_record], "crs = \"EPSG:26915\"", [short, full]),
+        (vec![&false_record, &bare], "missing_crs = \"EPSG:26915\"", [short, full]),
+        (vec![&false_record, &map], "", [full, short]),
+    ] {
         let job = Job::on(&files).with("input", line).report();
         let said = warnings(&job);
-        assert!(
-            said.contains("The record is ignored: unless [input] crs, missing_crs or another file states"),
-            "{said}"
-        );
+        assert!(said.contains(words[0]) && !said.contains(words[1]), "{said}");
         assert_eq!(job["crs"], "NAD83 / UTM zone 15N");
     }
     let earth = write(folder.path(), "earth.las", &[keys(&[[2048, 0, 1, 4978]])]);

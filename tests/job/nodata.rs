@@ -198,6 +198,30 @@ fn rows(files: &Files, name: &str, header: &str, [low, range]: [i32; 2], mark: &
 }
 
 #[test]
+fn a_usual_number_across_a_gap_is_told_at_any_share() {
+    let files = Files::new();
+    let valley = |i: usize| 39.9 + (i * 37 % 562) as f64 / 10.0;
+    let told = |share: usize, mark: f64, height: &dyn Fn(usize) -> f64| {
+        let row = |i: usize| {
+            let height = if i * 7 % 100 < share { mark } else { height(i) };
+            format!("{} {} {height:.1}\n", 400_000 + 25 * (i % 30), 5_000_000 + 25 * (i / 30))
+        };
+        let path = files.write("clip.xyz", (0..900).map(row).collect::<String>());
+        let checked = Job::on(&[&path]).run_with(&["check", "--json"]).succeeded().json();
+        warnings(&checked).contains("may stand for nodata. Leave such points out")
+    };
+    for share in [3, 30, 58] {
+        assert!(told(share, 0.0, &valley) && told(share, 255.0, &valley), "{share}");
+        // The sea beside a shore, a polder, whole metres beside the sea.
+        assert!(!told(share, 0.0, &|i| valley(i) - 39.8), "{share}");
+        assert!(!told(share, 0.0, &|i| valley(i) - 60.0), "{share}");
+        assert!(!told(share, 0.0, &|i| (valley(i) - 38.0).floor()), "{share}");
+        // A lake at one height in a country around it.
+        assert!(!told(share, 52.0, &valley), "{share}");
+    }
+}
+
+#[test]
 fn a_height_far_below_all_others_for_their_range_is_told() {
     let files = Files::new();
     let told = |path: &PathBuf| warnings(&Job::on(&[path]).report()).contains("may stand for nodata");

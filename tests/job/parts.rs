@@ -137,6 +137,12 @@ fn keep_steps_is_said_to_have_no_effect() {
     let said = warnings(&job);
     assert!(said.contains("keep_steps = true has no effect"), "{said}");
     assert!(job.report()["warnings"].to_string().contains("keep_steps = true has no effect"));
+    // The job says so before it reads its points.
+    for arguments in [&[][..], &["work", "--phase", "plan", "--task", "1/2"]] {
+        let said = wanted(2_000).run_with(arguments).succeeded().err;
+        let start = said.split("read: ").next().unwrap_or_default();
+        assert!(start.contains("keep_steps = true has no effect"), "{said}");
+    }
     let enough: u64 = said.split("max_points_per_part = ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!(!warnings(&wanted(enough)).contains("keep_steps"));
     assert!(warnings(&wanted(enough - 2)).contains("keep_steps"));

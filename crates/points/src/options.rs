@@ -177,6 +177,7 @@ impl InputOptions {
             bounds: self.bounds.filter(|_| self.to_crs.is_none()).map(|bounds| bounds.0),
             is_transformed: self.to_crs.is_some(),
             has_unit: self.unit.unit() != Unit::Unknown,
+            is_crs_stated: self.missing_crs.is_some() || !matches!(self.crs, CrsChoice::Auto | CrsChoice::First),
             is_foot_stated: matches!(self.unit, UnitChoice::Foot | UnitChoice::UsFoot),
             classes: self.kept_classes(),
             strict_classes: self.chooses_classes(),

@@ -243,7 +243,7 @@ fn open_las(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
         measured: None,
         points,
     };
-    source.drop_false_geocentric_crs()?;
+    source.drop_false_geocentric_crs(choice.is_crs_stated)?;
     source.keep_heights(choice);
     source.find_nodata(choice)?;
     Ok(source)

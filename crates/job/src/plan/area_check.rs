@@ -1,12 +1,12 @@
 //! Whether the points lie where their coordinate reference system is made for. If not, the terrain would be placed in another country or in
 //! a sea: x and y are exchanged, or the system is another one.
 
-use crate::plan::area_cure::{Change, changes, scales};
+use crate::plan::area_cure::{Change, changes, name_missing_crs, scales};
 use crate::plan::common_crs::TRANSFORM;
 use crate::plan::extent::{Extent, SourceBox};
 use crate::plan::height_range::{HeightSample, may_reach};
 use crate::plan::point_survey::box_around;
-use crs::{AreaOfUse, Crs, CrsKind, CrsTransform, DatumRule, Unit, arc, turned};
+use crs::{AreaOfUse, Crs, CrsChoice, CrsKind, CrsTransform, DatumRule, Unit, arc, turned};
 use lattice::Lattice;
 use points::Source;
 use points::options::{InputOptions, OutsideCrsArea};
@@ -83,8 +83,9 @@ pub(crate) fn check_places(
     let outside = find(None);
     let others = Others::than(&outside, sources, common);
     let outside = if others.is_some() { find(others.as_ref()) } else { outside };
+    let is_assumed = |source: &Source| is_crs_assumed(source, sources, options);
     if options.outside_crs_area == OutsideCrsArea::Stop {
-        refuse_hopeless(&outside)?;
+        refuse_hopeless(&outside, is_assumed)?;
     }
     if let Some((source, first)) = outside.first() {
         let count = match sources.len() {
@@ -92,9 +93,16 @@ pub(crate) fn check_places(
             all => format!("{} of {all} inputs, such as ", outside.len()),
         };
         let nothing = if first.is_hopeless() || first.is_local { "" } else { NOTHING_TO_DO };
-        warnings.push(format!("{count}{}: {}{nothing}", source.path.display(), first.sentence(source)));
+        let sentence = first.sentence(source, is_assumed(source));
+        warnings.push(format!("{count}{}: {sentence}{nothing}", source.path.display()));
     }
     Ok(())
+}
+
+/// Returns whether a source names no CRS, so that it is taken to be in that of the others.
+fn is_crs_assumed(source: &Source, sources: &[Source], options: &InputOptions) -> bool {
+    let is_open = options.crs == CrsChoice::Auto && options.missing_crs.is_none();
+    is_open && !source.own_crs().is_named() && sources.iter().any(|other| other.own_crs().is_named())
 }
 
 /// Warns about longitudes that count on beyond 180 degrees: whole turns are taken away.
@@ -162,11 +170,11 @@ impl Others {
 
 /// Fails if a source lies hopelessly far outside. It is no bad file that a job may leave out: what the sample of all files has of one depends
 /// on the others, and so would the mesh.
-fn refuse_hopeless(outside: &[(&Source, Outside)]) -> Result<()> {
+fn refuse_hopeless(outside: &[(&Source, Outside)], is_assumed: impl Fn(&Source) -> bool) -> Result<()> {
     let Some((source, first)) = outside.iter().find(|(_, found)| found.is_hopeless()) else { return Ok(()) };
     let what = format!(
         "{}; if the CRS and the coordinates are right, set [input] outside_crs_area = \"warn\"",
-        first.sentence(source)
+        first.sentence(source, is_assumed(source))
     );
     Err(Error::NoTerrain(format!("{}: {what}", source.path.display())))
 }
@@ -270,7 +278,8 @@ struct Outside {
     /// Whether they lie near the origin of the coordinates, where a site's own grid lies, and no survey is likely.
     is_local: bool,
     is_target: bool,
-    label: String,
+    /// The system.
+    crs: Crs,
     area: String,
 }
 
@@ -324,12 +333,17 @@ impl Outside {
             return None;
         }
         let is_local = is_local && change.is_none();
-        let contradiction = said.crs.difference_to_code();
-        let contradiction =
-            contradiction.map_or_else(String::new, |what| format!(", whose text and code differ in {what}"));
-        let label = format!("{}{contradiction}", said.crs.label());
         let area = area.label(degrees.unwrap_or_default());
-        Some(Outside { place, degrees, beyond, change, is_local, is_target: said.is_target, label, area })
+        Some(Outside {
+            place,
+            degrees,
+            beyond,
+            change,
+            is_local,
+            is_target: said.is_target,
+            crs: said.crs.clone(),
+            area,
+        })
     }
 
     /// Returns whether a terrain there is wrong for certain.
@@ -340,8 +354,8 @@ impl Outside {
         is_far || is_scaled || is_exchanged && (arc(self.beyond) > DOUBTFUL || self.beyond[1] > EXCHANGED)
     }
 
-    /// Says where the points lie and what to do.
-    fn sentence(&self, source: &Source) -> String {
+    /// Says where the points lie and what to do. `is_assumed` tells that the source names no CRS, and others do.
+    fn sentence(&self, source: &Source, is_assumed: bool) -> String {
         let [x, y] = self.place;
         let lie = match self.degrees {
             Some(_) if self.beyond == [0.0; 2] => "lie in an open sea, at longitude and latitude zero".into(),
@@ -353,7 +367,23 @@ impl Outside {
             ),
             None => format!("are no place on earth; its area of use is {}", self.area),
         };
-        format!("in {}, its points (around x {x:.2}, y {y:.2}) {lie}. {}", self.label, self.what_to_do(source))
+        let contradiction = self.crs.difference_to_code();
+        let contradiction =
+            contradiction.map_or_else(String::new, |what| format!(", whose text and code differ in {what}"));
+        let assumed = if is_assumed { "it names no CRS, and is taken to be in that of the other files: " } else { "" };
+        let what_to_do = if is_assumed { self.what_to_do_without_crs(source) } else { self.what_to_do(source) };
+        format!(
+            "{assumed}in {}{contradiction}, its points (around x {x:.2}, y {y:.2}) {lie}. {what_to_do}",
+            self.crs.label()
+        )
+    }
+
+    fn what_to_do_without_crs(&self, source: &Source) -> String {
+        match &self.change {
+            _ if source.looks_geocentric() => self.what_to_do(source),
+            Some(change) => change.cure_without_crs(source.format, &self.crs),
+            None => name_missing_crs(None, &self.crs),
+        }
     }
 
     fn what_to_do(&self, source: &Source) -> String {

@@ -18,6 +18,9 @@ const SOUTHERN: f64 = 1e7;
 /// False origins in metres of one map, the old one and the new one, which begins with whole millions: those of Switzerland.
 const RENEWED_ORIGINS: [[[f64; 2]; 2]; 1] = [[[600_000.0, 200_000.0], [2_600_000.0, 1_200_000.0]]];
 
+/// Zones of UTM, and the same with the number of the zone before the easting: EPSG codes, and how many metres that adds.
+const PREFIXED_ZONES: [(u32, u32, f64); 3] = [(25831, 5649, 31e6), (25832, 4647, 32e6), (25833, 5650, 33e6)];
+
 /// A change of all x and y of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Change {
@@ -124,6 +127,43 @@ impl Change {
         matches!(self, Change::Degrees { .. })
     }
 
+    /// Says what to do about a file of this format that names no CRS, and is taken to be in `crs`, that of the others. `[input] crs` would say
+    /// what all files are in.
+    pub(crate) fn cure_without_crs(&self, format: FileFormat, crs: &Crs) -> String {
+        let what = match self {
+            Change::Degrees { exchanged: false } => "As longitude and latitude, they lie within it".into(),
+            Change::Unit(unit) => format!("In the unit {}, they lie within it", unit.name()),
+            Change::Moved(by) => {
+                format!(
+                    "With {}, they lie within it: the number of a zone or a false origin is too much or missing",
+                    moved(*by)
+                )
+            }
+            Change::Southern(_, name) => {
+                format!("In the southern zone of the same number ({name}), they lie within its area")
+            }
+            Change::Degrees { .. }
+            | Change::Exchanged
+            | Change::ExchangedNearBy
+            | Change::Scaled(_)
+            | Change::Negated(_) => return self.cure(format),
+        };
+        format!("{what}. {}", name_missing_crs(self.code(crs), crs))
+    }
+
+    /// Returns the code of the system that the points are in, if this change brings them into `crs`.
+    fn code(&self, crs: &Crs) -> Option<u32> {
+        match self {
+            Change::Degrees { .. } => Some(4326),
+            Change::Southern(code, _) => Some(*code),
+            Change::Moved(by) => {
+                let prefixed = |(zone, _, metres): &&(u32, u32, f64)| crs.epsg == Some(*zone) && *by == [-metres, 0.0];
+                PREFIXED_ZONES.iter().find(prefixed).map(|(_, code, _)| *code)
+            }
+            _ => None,
+        }
+    }
+
     /// Says what to do about a file of this format.
     pub(crate) fn cure(&self, format: FileFormat) -> String {
         let is_text = format == FileFormat::Text;
@@ -161,6 +201,15 @@ impl Change {
             ),
         }
     }
+}
+
+/// Says how the user names the CRS of the files without one, beside others in `crs`.
+pub(crate) fn name_missing_crs(code: Option<u32>, crs: &Crs) -> String {
+    let [missing, common] = [code, crs.epsg].map(|code| code.map_or("EPSG:...".into(), |code| format!("EPSG:{code}")));
+    format!(
+        "Name the CRS of the files without one with [input] missing_crs = \"{missing}\", together with to_crs = \"{common}\", which transforms \
+         them into that of the others"
+    )
 }
 
 /// Says how x and y are exchanged.

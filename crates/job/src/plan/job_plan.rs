@@ -177,7 +177,7 @@ impl Plan {
     }
 
     /// Says that a job of several parts does not keep its steps, if the user wants it to.
-    fn freed_steps(&self) -> Option<String> {
+    pub(crate) fn freed_steps(&self) -> Option<String> {
         let is_wanted = self.options.limits.keep_steps == KeepSteps::Always;
         (is_wanted && !self.is_one_part()).then(|| {
             let points = self.inputs.iter().map(PlannedInput::decoded_records).sum();

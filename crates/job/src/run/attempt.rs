@@ -214,6 +214,7 @@ fn attempt(
     let planned = stage.finish();
     let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));
     note_skipped(&plan.skipped, progress);
+    plan.freed_steps().iter().for_each(|what| progress.note(what));
     let threads = workers(options, plan.records)?;
     if !run.force && job.work == EarlierWork::Interrupted {
         on_threads(threads, || require_memory_and_disk(&plan, threads))?;

@@ -19,10 +19,7 @@ const LEAST_GAP: f64 = 5.0;
 /// and so many times as far as all others spread.
 const TIMES_RANGE: f64 = 8.0;
 
-/// A value of a small share of all records, one in so many, may stand for nodata nearer to the others,
-const SHARE: u64 = 10;
-
-/// if so many records have it.
+/// A value that so many records share may stand for nodata nearer to the others.
 const LEAST_RECORDS: u64 = 5;
 
 /// It is a usual number for nodata at least so many metres from the nearest other height, since the shore of water lies closer to it, and so many
@@ -30,7 +27,16 @@ const LEAST_RECORDS: u64 = 5;
 const USUAL_GAP: f64 = 10.0;
 const TIMES_OF_USUAL: f64 = 1.0 / 3.0;
 
-/// or any number so far above all others: a tower may stand out of them. Below, a quarry may lie.
+/// or at least so many metres, and so many times as far as the nearest others spread. All others may spread far in mountains.
+const EMPTY_GAP: f64 = 25.0;
+const TIMES_OF_NEAREST: f64 = 4.0;
+
+/// Either is so many times as wide as the least distance of the nearest others: heights may be rounded to whole metres, or be those of contours.
+const STEPS: f64 = 4.0;
+
+/// A small share of all records, one in so many, may have any number so far above all others: a tower may stand out of them. Below, a quarry
+/// may lie.
+const SHARE: u64 = 10;
 const TOWER: f64 = 150.0;
 const TIMES_OF_TOWER: f64 = 2.0;
 
@@ -107,11 +113,23 @@ pub struct SharedHeight {
 }
 
 impl SharedHeight {
-    /// Returns whether few of all `records` have this value, and it lies at least `least` below `others`, and so many `times` as far as these
-    /// lie from each other.
-    fn is_set_apart(&self, records: u64, [low, high]: [f64; 2], least: f64, times: f64) -> bool {
+    /// Returns whether few of all `records` have this value, and it lies at least `least` below `others`, much farther than these lie from each
+    /// other.
+    fn is_set_apart(&self, records: u64, [low, high]: [f64; 2], least: f64) -> bool {
         let is_small_share = self.count >= LEAST_RECORDS && self.count.saturating_mul(SHARE) < records;
-        is_small_share && low - self.value >= least.max(times * (high - low))
+        is_small_share && low - self.value >= least.max(TIMES_OF_TOWER * (high - low))
+    }
+
+    /// Returns whether records share this value, and a gap parts it from all `others`, of which `nearest` are the lowest. A unit of heights is
+    /// so many `metres`.
+    fn is_across_gap(&self, nearest: &[SharedHeight], [low, high]: [f64; 2], metres: f64) -> bool {
+        let gap = low - self.value;
+        let spread = nearest.last().map_or(0.0, |last| last.value - low);
+        let steps = nearest.windows(2).map(|pair| pair[1].value - pair[0].value);
+        let is_wide = |least: f64, times: f64, range: f64| gap * metres >= least && gap >= times * range;
+        self.count >= LEAST_RECORDS
+            && gap >= STEPS * steps.fold(f64::INFINITY, f64::min)
+            && (is_wide(USUAL_GAP, TIMES_OF_USUAL, high - low) || is_wide(EMPTY_GAP, TIMES_OF_NEAREST, spread))
     }
 }
 
@@ -270,22 +288,20 @@ impl Extremes {
         low.or_else(|| high().map(SuspectHeight::with_other_sign))
     }
 
-    /// Returns the lowest value if several records share it, and it lies below all others by many times their range, or the lowest or the
-    /// highest that few of all `records` share, and that lies apart. Nearer than a [`Extremes::doubtful`] one, it may be water, or a roof.
+    /// Returns the lowest value if several records share it, and it lies below all others by many times their range, the lowest or the highest
+    /// if it is a usual number for nodata and a gap parts it from all others, or the highest that few of all `records` share, and that lies
+    /// apart. Nearer than a [`Extremes::doubtful`] one, it may be water, or a roof.
     pub fn set_apart(&self, metres: f64, records: u64) -> Option<SuspectHeight> {
-        let [usual_gap, tower] = [USUAL_GAP, TOWER].map(|gap| gap / metres);
-        let is_usual = |height: &SharedHeight, value: f64, others: [f64; 2]| {
-            is_usual_number(value) && height.is_set_apart(records, others, usual_gap, TIMES_OF_USUAL)
-        };
-        let low = self.lowest.doubtful(&self.highest, FEW[0], |height, _, others| {
+        let low = self.lowest.doubtful(&self.highest, FEW[0], |height, above, others| {
             let gap = others[0] - height.value;
             let is_deep = gap * metres >= LEAST_GAP && gap >= TIMES_RANGE * (others[1] - others[0]);
-            is_deep || is_usual(height, height.value, others)
+            is_deep || is_usual_number(height.value) && height.is_across_gap(above, others, metres)
         });
         let high = || {
-            self.highest.doubtful(&self.lowest, FEW[1], |height, _, others| {
-                is_usual(height, 0.0 - height.value, others)
-                    || height.is_set_apart(records, others, tower, TIMES_OF_TOWER)
+            self.highest.doubtful(&self.lowest, FEW[1], |height, below, others| {
+                let is_usual = is_usual_number(0.0 - height.value);
+                is_usual && height.is_across_gap(below, others, metres)
+                    || height.is_set_apart(records, others, TOWER / metres)
             })
         };
         low.or_else(|| high().map(SuspectHeight::with_other_sign))
@@ -505,7 +521,6 @@ mod tests {
         );
         assert_eq!(value(plain(5, 60.0, 2.0).set_apart(1.0, 1_000)), Some(0.0));
         assert_eq!(value(plain(2, 60.0, 2.0).set_apart(1.0, 1_000)), None);
-        assert_eq!(value(plain(50, 60.0, 8.0).set_apart(1.0, 500)), None);
         assert_eq!(value(plain(50, 4.0, 0.4).set_apart(1.0, 1_000)), None);
         // The same in millimetres, and in feet.
         assert_eq!(value(plain(6, 500.0, 60.0).set_apart(0.001, 1_000)), None);
@@ -515,7 +530,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_of_few_records_that_lies_apart_for_the_range_of_the_others_is_set_apart() {
+    fn a_usual_number_across_a_gap_and_a_value_of_few_records_far_above_are_set_apart() {
         let hills = |mark: f64, count: usize, from: f64, range: f64| {
             let others = (0..900).map(move |i| from + range * f64::from(i % 97) / 96.0);
             let found = extremes(std::iter::repeat_n(mark, count).chain(others)).set_apart(1.0, 1_000);
@@ -526,18 +541,44 @@ mod tests {
         assert_eq!(hills(400.0, 60, 17.0, 32.0), Some((400.0, [17.0, 49.0])));
         assert_eq!(hills(-1.0, 60, 67.0, 32.0), Some((-1.0, [67.0, 99.0])));
         assert_eq!(hills(0.0, 60, -70.0, 42.0), Some((0.0, [-70.0, -28.0])));
-        // Near for the range of the others, or at all, or of few records, or of many.
+        // At any share, and far for the nearest of the others alone.
+        for count in [5, 60, 100, 2_000, 100_000] {
+            assert_eq!(hills(0.0, count, 28.0, 42.0), Some((0.0, [28.0, 70.0])), "{count}");
+            assert_eq!(hills(255.0, count, 17.0, 32.0), Some((255.0, [17.0, 49.0])), "{count}");
+            assert_eq!(hills(0.0, count, 90.0, 192.0), Some((0.0, [90.0, 282.0])), "{count}");
+            assert_eq!(hills(-99.0, count, -54.0, 96.0), Some((-99.0, [-54.0, 42.0])), "{count}");
+        }
+        // Near for the range of the others, or at all, or of few records.
         for (mark, count, from, range) in [
             (0.0, 60, 28.0, 96.0),
+            (0.0, 2_000, 24.0, 96.0),
             (0.0, 60, 9.0, 3.0),
+            (0.0, 2_000, 9.0, 3.0),
             (0.0, 4, 28.0, 42.0),
-            (0.0, 100, 28.0, 42.0),
             // No usual number: the floor of a quarry, and a tower.
             (560.0, 60, 700.0, 20.0),
             (149.0, 60, 0.0, 20.0),
+            (400.0, 2_000, 17.0, 32.0),
         ] {
             assert_eq!(hills(mark, count, from, range), None, "{mark} {count} {from} {range}");
         }
+    }
+
+    #[test]
+    fn a_usual_number_that_other_heights_lead_to_is_not_set_apart() {
+        let with_zeros = |heights: Vec<f64>| {
+            let zeros = std::iter::repeat_n(0.0, 900);
+            extremes(zeros.chain(heights)).set_apart(1.0, 2_000).map(|doubt| doubt.others)
+        };
+        let hills = |from: f64| (0..900).map(move |i| from + f64::from(i % 420) / 10.0);
+        // The sea, a polder, a flat country, a lake in a hollow.
+        assert_eq!(with_zeros(hills(0.1).collect()), None);
+        assert_eq!(with_zeros(hills(-30.0).collect()), None);
+        assert_eq!(with_zeros(hills(28.0).chain((1..28).map(f64::from)).collect()), None);
+        assert_eq!(with_zeros((0..900).map(|i| 0.01 * f64::from(i % 7)).collect()), None);
+        // Heights in steps of 5 and of 1 metre.
+        assert_eq!(with_zeros((0..900).map(|i| 15.0 + 5.0 * f64::from(i % 6)).collect()), None);
+        assert_eq!(with_zeros((0..900).map(|i| 15.0 + f64::from(i % 26)).collect()), Some([15.0, 40.0]));
     }
 
     #[test]

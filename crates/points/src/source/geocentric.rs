@@ -34,11 +34,12 @@ const NO_HEIGHT: f64 = 20_000.0;
 
 impl Source {
     /// Drops a record of a geocentric system if most points of a sample lie far from the surface of the earth: then it is false, and the
-    /// coordinates are a plane. Its unit, if it states one, is that of the plane only where nothing else states a unit.
+    /// coordinates are a plane. Its unit, if it states one, is that of the plane only where nothing else states a unit. The warning advises
+    /// nothing if `is_crs_stated`: the user says what the points are in.
     ///
     /// # Errors
     /// `Io` or `Input` if the file cannot be read any more.
-    pub(super) fn drop_false_geocentric_crs(&mut self) -> Result<()> {
+    pub(super) fn drop_false_geocentric_crs(&mut self, is_crs_stated: bool) -> Result<()> {
         if self.crs.kind != CrsKind::Geocentric {
             return Ok(());
         }
@@ -66,14 +67,18 @@ impl Source {
             },
         };
         let stated = Some(self.crs.horizontal).filter(|unit| *unit != Unit::Unknown);
-        let in_unit = stated.map_or_else(String::new, |unit| {
-            format!(" in the unit {} (set [input] unit to state another)", unit.name())
+        let label = self.crs.label();
+        self.warnings.push(if is_crs_stated {
+            format!("its record of a geocentric coordinate system ({label}) is ignored: [input] states what its points are in")
+        } else {
+            let in_unit = stated.map_or_else(String::new, |unit| {
+                format!(" in the unit {} (set [input] unit to state another)", unit.name())
+            });
+            format!(
+                "its coordinate system ({label}) is geocentric, but {why}. The record is ignored: unless [input] crs, missing_crs or another \
+                 file states what the points are in, they are taken as a plane{in_unit}"
+            )
         });
-        self.warnings.push(format!(
-            "its coordinate system ({}) is geocentric, but {why}. The record is ignored: unless [input] crs, missing_crs or another file \
-             states what the points are in, they are taken as a plane{in_unit}",
-            self.crs.label(),
-        ));
         self.crs = Crs::default();
         self.unit_of_false_record = stated;
         Ok(())

@@ -1,5 +1,6 @@
 //! Names of columns in a comment before the rows, such as `# x y z`.
 
+use crate::text::axis_values::AxisValues;
 use crate::text::column_list::doubt;
 use crate::text::decimal_comma::is_pointed;
 use crate::text::delimiter::{CANDIDATES, Delimiter};
@@ -33,7 +34,8 @@ pub(crate) fn names_in_comments(
 ) -> Result<CommentNames, String> {
     let rows = Rows { rows: &rows[..rows.len().min(ROWS_FOR_NAMES)], candidates };
     let (mut misfit, mut words) = (None, None);
-    let is_comment = |line: &&[u8]| !line.trim_ascii().is_empty() && is_skipped(line, comments);
+    let gives_values = |line: &[u8]| texts_of(line, comments).iter().any(|text| AxisValues::read(text).is_some());
+    let is_comment = |line: &&[u8]| !line.trim_ascii().is_empty() && is_skipped(line, comments) && !gives_values(line);
     for (at, line) in lines.iter().enumerate().rev().filter(|(_, line)| is_comment(line)) {
         for text in texts_of(line, comments) {
             let others = candidates.iter().filter(|own| !CANDIDATES.contains(own));
@@ -197,9 +199,16 @@ mod tests {
             ("# y,x,z", "2;1;3;4"),
             ("# y,x,z", "5933084,74,565013,44,25,3"),
             ("# id,x,y,z", "1,565013,44,5933084,74,25,3"),
+            ("# columns x y z: 2 3 4", "1 2 3 4"),
         ] {
             assert_eq!(places(comment, row), Err(()), "{comment}");
         }
+        for comment in ["# max x y z: 4.5 5.5 6.5", "# scale factor x y z  0.01 0.01 0.01"] {
+            for row in ["1 2 3 4", "1 2 3 4 5 6", "1 2 3 4 5 6 7"] {
+                assert_eq!(places(comment, row), Ok(None), "{comment} {row}");
+            }
+        }
+        assert_eq!(places("#timestamp tx ty tz qx qy qz qw", "1305031102.5 1.5 2.5 3.5 0 0 0 1"), Ok(Some([1, 2, 3])));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! A comment that is a header, such as `# time, latitude, longitude, height`, but does not name x, y and z by names that are known, or
 //! lists them in another order. Without it, the first three columns would be taken for x, y and z.
 
+use crate::text::axis_values::AxisValues;
 use crate::text::column_list::{Doubt, Word, doubt, doubt_about_letters, words};
 use crate::text::comment_names::texts_of;
 use crate::text::delimiter::{CANDIDATES, Delimiter};
@@ -8,7 +9,9 @@ use crate::text::header::{ROWS_FOR_NAMES, columns_of};
 use crate::text::lines::shown;
 use crate::text::name::{Name, words_of};
 use crate::text::names::{NamedColumns, named_columns};
+use crate::text::number::Number;
 use crate::text::role::ColumnRole;
+use crate::text::units::TextUnit;
 use crate::windows_1252::decoded;
 
 /// So many names of coordinates and times make a header.
@@ -17,6 +20,13 @@ const LEAST_KNOWN: usize = 2;
 /// So many comments before the rows are looked at, and so many bytes of each.
 const MOST_COMMENTS: usize = 1000;
 const LONGEST_COMMENT: usize = 1 << 14;
+
+/// Measures that are no coordinates of a map: along a road and across it, around an instrument, in an image.
+const MEASURES: [&str; 3] = [
+    "station sta stn stationierung chainage km kp pk offset off offs abstand deport distance dist",
+    "range rng azimuth azi az bearing angle winkel hz theta phi psi rho r",
+    "line inline crossline sample row col column zeile spalte u v w i j t ts time timestamp",
+];
 
 const REMEDY: &str = "name the columns with `columns` under [input.csv], or set header = false there to take the first three for x, y and z";
 
@@ -42,6 +52,10 @@ impl Comments<'_> {
     /// Returns what to say of a comment that names other columns first than x, y and z. It is known that no comment names the columns by
     /// names that are known. If `has_words`, one begins with x, y and z.
     pub(crate) fn unread_header(&self, has_words: bool) -> Option<UnreadHeader> {
+        if let Some(line) = self.contradicted_bounds() {
+            let what = "bounds x, y and z, and other columns than the first three lie within these bounds";
+            return Some(UnreadHeader::Certain(format!("the comment {} {what}: {REMEDY}", shown(line))));
+        }
         let list = if has_words { None } else { self.unread_list() };
         if let Some((line, Doubt::Certain, error)) = list {
             return Some(UnreadHeader::Certain(refusal(line, &error)));
@@ -85,11 +99,37 @@ impl Comments<'_> {
         texts.map(|(line, text)| (line, &text[..text.len().min(LONGEST_COMMENT)]))
     }
 
+    /// Returns the first rows, each with what may part its columns.
+    fn readings(&self) -> impl Iterator<Item = (Delimiter, &[u8])> {
+        let rows = &self.rows[..self.rows.len().min(ROWS_FOR_NAMES)];
+        let readings = rows.iter().flat_map(|row| self.candidates.iter().map(move |own| (*own, *row)));
+        readings.filter(|(own, row)| own.numbers(row) >= 3)
+    }
+
     /// Returns how many columns the first rows have.
     fn widths(&self) -> Vec<usize> {
-        let rows = &self.rows[..self.rows.len().min(ROWS_FOR_NAMES)];
-        let readings = rows.iter().flat_map(|row| self.candidates.iter().map(move |own| (own, *row)));
-        readings.filter(|(own, row)| own.numbers(row) >= 3).map(|(own, row)| columns_of(*own, row)).collect()
+        self.readings().map(|(own, row)| columns_of(own, row)).collect()
+    }
+
+    /// Returns a comment with the least or the greatest x, y and z, beyond which the first three columns of all first rows lie, where others lie
+    /// within. Some programs write bounds that are no bounds of the rows.
+    fn contradicted_bounds(&self) -> Option<&[u8]> {
+        let numbers = |(own, row): (Delimiter, &[u8])| -> Vec<f64> {
+            own.fields(row).iter().map_while(|field| Some(Number::parse(field)?.value())).collect()
+        };
+        let rows: Vec<Vec<f64>> = self.readings().map(numbers).collect();
+        let columns = rows.iter().map(Vec::len).min()?;
+        let bounds: Vec<(&[u8], AxisValues)> =
+            self.texts().filter_map(|(line, text)| Some((line, AxisValues::read(text)?))).collect();
+        let exclude =
+            |bounds: &AxisValues, row: &[f64], [x, y, z]: [usize; 3]| bounds.exclude([row[x], row[y], row[z]]);
+        let mut windows = (2..columns).map(|last| [last - 2, last - 1, last]);
+        let first = windows.next()?;
+        let (line, _) = bounds.iter().find(|(_, bounds)| rows.iter().all(|row| exclude(bounds, row, first)))?;
+        let lie_within =
+            |order: [usize; 3]| rows.iter().all(|row| bounds.iter().all(|(_, bounds)| !exclude(bounds, row, order)));
+        let is_other = lie_within([1, 0, 2]) || windows.any(|[x, y, z]| lie_within([x, y, z]) || lie_within([y, x, z]));
+        is_other.then_some(*line)
     }
 
     /// Returns the last comment that is a list of names, and what is wrong with them.
@@ -144,6 +184,9 @@ fn header_doubt(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> Opt
         // Few words of other scripts are known.
         return is_as_wide.then_some(Doubt::Possible);
     }
+    let measures = fields.iter().filter(|field| names_measure(field)).count();
+    let is_known = |field: &&[u8]| names_measure(field) || is_column(&words(field));
+    let are_measures = measures > 0 && fields.iter().all(is_known);
     let is_word = |field: &&[u8]| !Name::read(field).has_blanks();
     let are_words = delimiter != Delimiter::Blank && fields.iter().all(is_word);
     let fields: Vec<(bool, Vec<Word>)> = fields.iter().map(|field| (is_word(field), words(field))).collect();
@@ -162,11 +205,23 @@ fn header_doubt(delimiter: Delimiter, fields: &[&[u8]], widths: &[usize]) -> Opt
     let axes = kinds.into_iter().filter(|kind| *kind).count();
     let are_known = known >= LEAST_KNOWN && axes > 0 && (axes > 1 || is_kind(names_other));
     let is_long = delimiter != Delimiter::Blank && count(|_, field| is_column(field)) >= LEAST_KNOWN;
-    if are_known && (is_as_wide || is_long) || is_as_wide && are_words && known > 0 {
+    // "station offset elevation", "theta phi r"
+    let is_list_of_measures = are_measures && (kinds[2] || measures == named);
+    if are_known && (is_as_wide || is_long) || is_as_wide && (is_list_of_measures || are_words && known > 0) {
         return Some(Doubt::Certain);
     }
     let has_unknown = count(|_, field| field.contains(&Word::Unknown)) > 0;
     (is_as_wide && are_words && has_unknown).then_some(Doubt::Possible)
+}
+
+/// Returns whether a field is the name of a measure that is no coordinate of a map, with or without its unit.
+fn names_measure(field: &[u8]) -> bool {
+    let words = words_of(field);
+    let is_measure = |word: &String| MEASURES.iter().any(|known| known.split(' ').any(|known| known == word));
+    match words.split_first() {
+        Some((first, units)) => is_measure(first) && units.iter().all(|unit| TextUnit::read(unit).is_some()),
+        None => false,
+    }
 }
 
 /// Returns whether a field gives the value of what it names, and not the place of a column.
@@ -236,6 +291,65 @@ mod tests {
             let words = ["names no column", "lists other columns first"];
             let is_named = |what: &str| words.iter().any(|word| what.contains(word));
             assert!(matches!(&what, Some(UnreadHeader::Certain(what)) if is_named(what)), "{comment}: {what:?}");
+        }
+    }
+
+    #[test]
+    fn lists_of_measures_are_headers() {
+        for comment in [
+            "# Station Offset Elevation",
+            "# Sta Off Elev",
+            "# Sta. Offset(m) Elev(m)",
+            "# azimuth range height",
+            "# line sample elevation",
+            "# chainage offset z",
+            "# km offset hoehe",
+            "# theta r z",
+            "# u v height",
+            "# azimuth elevation range",
+            "# theta phi r",
+            "# Columns: station offset level",
+            "# Distance\tOffset\tHeight",
+        ] {
+            for row in ["0.5 -9.5 124.8", "0.5,-9.5,124.8"] {
+                let what = unread(comment, row);
+                let is_named = |what: &str| {
+                    what.contains(&comment[2..8]) && what.contains("names no column") && what.contains("`columns`")
+                };
+                assert!(matches!(&what, Some(UnreadHeader::Certain(what)) if is_named(what)), "{comment}: {what:?}");
+            }
+            assert_eq!(unread(comment, "0.5 -9.5 124.8 1"), None, "{comment}");
+        }
+        for comment in [
+            "# ground elevation points",
+            "# Digital elevation model",
+            "# mean height 120",
+            "# station height",
+            "# station of elevation",
+            "# line 12 height",
+            "# range of heights",
+            "# total station survey",
+        ] {
+            assert_eq!(unread(comment, "565013.5 5933084.7 25.3"), None, "{comment}");
+        }
+    }
+
+    #[test]
+    fn bounds_of_another_order_are_refused() {
+        let row = "400000.0 556800.33 5423136.67 124.84";
+        for comment in ["# max x y z: 557098.32 5423398.72 141.06", "# min x y z: 556700.67 5423100.09 107.02"] {
+            let what = unread(comment, row);
+            assert!(
+                matches!(&what, Some(UnreadHeader::Certain(what)) if what.contains("bounds x, y and z")),
+                "{what:?}"
+            );
+            assert_eq!(unread(comment, "556800.33 5423136.67 124.84 400000.0"), None);
+        }
+        let exchanged = unread("# max x y z: 557098.32 5423398.72 141.06", "5423136.67 556800.33 124.84");
+        assert!(matches!(exchanged, Some(UnreadHeader::Certain(_))));
+        // Bounds that were never written, or before a shift, are those of no column.
+        for comment in ["# offset x y z: 500000 5000000 0", "# max x y z: 0 0 0", "# min x y z: 9e6 9e6 9e6"] {
+            assert_eq!(unread(comment, row), None, "{comment}");
         }
     }
 

@@ -1,6 +1,7 @@
 //! Points as text, one per line. A first pass over the whole file finds out how it is laid out and what it holds; then its chunks
 //! are decoded independently.
 
+pub(crate) mod axis_values;
 pub(crate) mod column_list;
 pub(crate) mod columns;
 pub(crate) mod comment_names;

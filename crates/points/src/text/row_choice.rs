@@ -45,6 +45,8 @@ pub struct RowChoice {
     pub has_unit: bool,
     /// Whether the user states which foot the coordinates are in.
     pub is_foot_stated: bool,
+    /// Whether the user states what the coordinates are in, of all files or of those that name no CRS.
+    pub is_crs_stated: bool,
     /// Only rows of these classes.
     pub classes: [bool; 256],
     /// Whether the user has said which classes. If not, a class that cannot be read counts as 0.
@@ -69,6 +71,7 @@ impl RowChoice {
             is_transformed: false,
             has_unit: false,
             is_foot_stated: false,
+            is_crs_stated: false,
             classes: [true; 256],
             strict_classes: false,
             returns: KeptReturns::All,

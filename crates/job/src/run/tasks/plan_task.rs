@@ -58,6 +58,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<Strin
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
+    plan.freed_steps().iter().for_each(|what| run.progress.note(what));
     let threads = workers(options, plan.records)?;
     if !run.force {
         on_threads(threads, || require_memory_and_disk(&plan, threads))?;
