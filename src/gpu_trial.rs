@@ -1,5 +1,6 @@
 //! A short job on a made-up terrain, with a GPU and without it: whether the results are the same, and how much time the GPU saves.
 
+use crate::exit_code::exit_code;
 use crate::{config, sample};
 use delaunay_gpu::selftest;
 use delaunay_gpu::selftest::SelfTest;
@@ -70,14 +71,14 @@ pub fn run(name: Option<&str>, leaves: Option<usize>) -> Result<GpuCheck> {
     };
     Ok(match trial.transpose() {
         Ok(trial) => GpuCheck { test, trial, failure: None },
-        Err(Error::Interrupted) => return Err(Error::Interrupted),
+        Err(job::Error::System(Error::Interrupted)) => return Err(Error::Interrupted),
         Err(error) => GpuCheck { test, trial: None, failure: Some(error.to_string()) },
     })
 }
 
-fn compare_jobs(adapter: &str, is_software: bool) -> Result<GpuTrial> {
+fn compare_jobs(adapter: &str, is_software: bool) -> job::Result<GpuTrial> {
     // Until here a signal ends the process at once.
-    interrupt::listen()?;
+    interrupt::listen(exit_code)?;
     let points = if is_software { SOFTWARE_POINTS } else { POINTS };
     let place = tempfile::tempdir().map_err(Error::io("create a directory in", std::env::temp_dir()))?;
     sample::write(&place.path().join("terrain.laz"), points, 1, false)?;
@@ -112,7 +113,7 @@ fn write_config(place: &Path, backend: &str, adapter: &str) -> Result<PathBuf> {
 }
 
 /// Runs a job, and removes its results.
-fn run_job(config: &Path) -> Result<Report> {
+fn run_job(config: &Path) -> job::Result<Report> {
     let options = config::load(config)?;
     let report = job::run(&options, RunOptions { force: true, ..ProgressOutput::Quiet.into() })?;
     let results = &options.output.directory;

@@ -7,6 +7,8 @@
 pub mod cli;
 pub mod completions;
 pub mod config;
+pub mod error;
+pub mod exit_code;
 #[cfg(feature = "gpu")]
 pub mod gpu_trial;
 pub mod init;

@@ -4,6 +4,8 @@
 
 use clap::Parser;
 use gdt_batch::cli::{Cli, CliCommand, PrintOptions, ViewOptions};
+use gdt_batch::error::{Error, Result};
+use gdt_batch::exit_code::{exit_code, exit_code_of_verify};
 use gdt_batch::init::NewConfiguration;
 use gdt_batch::submit::local::LocalEngine;
 use gdt_batch::submit::request::Request;
@@ -25,12 +27,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use sys::threads;
 use sys::threads::on_threads;
-use sys::{Error, Result, interrupt, say, shortage, terminal};
+use sys::{interrupt, say, shortage, terminal};
 use tiles::file_names::OutputFiles;
 use verify::Conclusion;
 
 fn main() -> ExitCode {
-    match shortage::listen().and_then(|()| run(command_line())) {
+    match shortage::listen(exit_code).map_err(Error::from).and_then(|()| run(command_line())) {
         Ok(code) => code,
         Err(error) => {
             say(&format!("error: {error}"));
@@ -56,7 +58,10 @@ fn run(cli: Cli) -> Result<ExitCode> {
     match (&cli.command, &cli.config) {
         (Some(_), Some(config)) => {
             let config = config.display();
-            Err(Error::Config(format!("{config} and a command: name the configuration after the command, or alone")))
+            Err(sys::Error::Config(format!(
+                "{config} and a command: name the configuration after the command, or alone"
+            ))
+            .into())
         }
         (Some(CliCommand::Init { files, output, force }), _) => write_configuration(files, output, *force, print),
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
@@ -90,8 +95,9 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(CliCommand::Info { files, histogram }), _) => show_info(files, *histogram, print),
         (Some(CliCommand::Gpu { adapter, leaves }), _) => test_gpu(adapter.as_deref(), *leaves, print),
         (Some(CliCommand::Sample { file, points, seed, overwrite }), _) => {
-            interrupt::listen()?;
-            sample::write(file, *points, *seed, *overwrite).map(|()| ExitCode::SUCCESS)
+            interrupt::listen(exit_code)?;
+            sample::write(file, *points, *seed, *overwrite)?;
+            Ok(ExitCode::SUCCESS)
         }
         (Some(CliCommand::Completions { shell }), _) => {
             print_text(&completions::script(*shell)).map(|()| ExitCode::SUCCESS)
@@ -100,7 +106,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
             print_text(&manual::man(command.as_deref())?).map(|()| ExitCode::SUCCESS)
         }
         (None, Some(config)) => run_job(config, &cli),
-        (None, None) => Err(Error::Config("name a configuration file; --help shows how".into())),
+        (None, None) => Err(sys::Error::Config("name a configuration file; --help shows how".into()).into()),
     }
 }
 
@@ -116,7 +122,7 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
         submission: 0,
     };
     let config = config::load(path)?;
-    interrupt::listen()?;
+    interrupt::listen(exit_code)?;
     show_report(&job::run(&config, options)?, &config, cli.print)
 }
 
@@ -150,7 +156,7 @@ fn work(
     if let Some(threads) = threads {
         config.limits.threads = Threads(threads.into());
     }
-    interrupt::listen()?;
+    interrupt::listen(exit_code)?;
     match job::work(&config, run, phase, task)? {
         TaskOutcome::Published(report) => show_report(&report, &config, print),
         TaskOutcome::Done(done) => print_result(&done, print).map(|()| ExitCode::SUCCESS),
@@ -164,7 +170,7 @@ fn request(path: &Path, engine: Engine, tasks: u32, restart: bool) -> Result<Req
     let is_out_of_sight = engine == Engine::Kubernetes && !config.output.directory.exists();
     let phases = if is_out_of_sight || restart { PhaseTasks::all(tasks) } else { job::missing_tasks(&config, tasks)? };
     let submission = if restart { Some(job::new_submission()) } else { None };
-    Request::new(path, &config, tasks, submission, phases)
+    Ok(Request::new(path, &config, tasks, submission, phases)?)
 }
 
 /// Says that a job is done, instead of sending it.
@@ -192,7 +198,7 @@ fn submit(engine: Engine, request: &Request, added: &[String], print: PrintOptio
         Engine::Slurm => print_result(&slurm::send(request, added)?, print)?,
         Engine::Kubernetes => print_result(&kubernetes::send(request, added)?, print)?,
         Engine::Local => {
-            interrupt::listen()?;
+            interrupt::listen(exit_code)?;
             let engine = LocalEngine::new(request, added, print.quiet, print.json)?;
             engine.run(|| job::missing_tasks_of_planned(&config::load(&request.config)?, request.tasks))?;
         }
@@ -204,19 +210,20 @@ fn submit(engine: Engine, request: &Request, added: &[String], print: PrintOptio
 fn write_configuration(clouds: &[PathBuf], file: &Path, force: bool, print: PrintOptions) -> Result<ExitCode> {
     let is_printed = file == Path::new("-");
     if is_printed && print.json {
-        return Err(Error::Config(
+        return Err(sys::Error::Config(
             "--output - prints the configuration, and --json something else: leave out one".into(),
-        ));
+        )
+        .into());
     }
     let made = on_threads(threads::available(), || init::init(clouds, file, force))?;
     if is_printed {
         print_text(&made.text)?;
-        return made.obstacle.map_or(Ok(ExitCode::SUCCESS), Err);
+        return made.obstacle.map_or(Ok(ExitCode::SUCCESS), |obstacle| Err(obstacle.into()));
     }
     show_configuration(&made, file, print)?;
     let Some(obstacle) = made.obstacle else { return Ok(ExitCode::SUCCESS) };
     say(&format!("error: {} is written, but its job would stop: {obstacle}", file.display()));
-    Ok(ExitCode::from(obstacle.exit_code()))
+    Ok(ExitCode::from(exit_code(obstacle.kind())))
 }
 
 /// Prints what a configuration says that was written. If that fails, it is there nevertheless: to write it again would be refused.
@@ -235,7 +242,8 @@ fn check_job(path: &Path, print: PrintOptions) -> Result<ExitCode> {
     let config = config::load(path)?;
     let preflight = on_threads(config.threads(), || check::check(&config))?;
     print_result(&preflight, print)?;
-    preflight.passes().map(|()| ExitCode::SUCCESS)
+    preflight.passes()?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Verifies the output of a job. With `--quiet` too, an error says what is wrong or cannot be proved.
@@ -251,7 +259,7 @@ fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: Print
     }
     let first = verdict.failures.first().or(verdict.unproved.as_ref()).map_or("", String::as_str);
     say(&format!("error: {}: {}: {first}", directory.display(), verdict.sentence()));
-    Ok(ExitCode::from(verdict.verdict.exit_code()))
+    Ok(ExitCode::from(exit_code_of_verify(verdict.verdict)))
 }
 
 /// Serves a terrain until Ctrl-C. That is how it is meant to end, so the exit code is 0 then.
@@ -259,11 +267,11 @@ fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: Print
 fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
     use gdt_batch::view::{View, browser};
     if !tiles::page::is_built_in() {
-        return Err(Error::Config(tiles::page::NOT_BUILT_IN.into()));
+        return Err(sys::Error::Config(tiles::page::NOT_BUILT_IN.into()).into());
     }
     let wanted = std::net::SocketAddr::new(options.address, options.port);
     let view = View::open(&options.directory, wanted, &options.host)?;
-    interrupt::listen()?;
+    interrupt::listen(exit_code)?;
     if print.quiet && !print.json {
         // Without the URL nobody could use the command: that a browser was started does not mean that it shows.
         print_text(&view.url)?;
@@ -273,12 +281,13 @@ fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
     if let Some(Err(why)) = (!options.no_open).then(|| browser::open(&view.url)) {
         say(&format!("no browser was opened ({why}): open {} yourself", view.url));
     }
-    view.run().map(|()| ExitCode::SUCCESS)
+    view.run()?;
+    Ok(ExitCode::SUCCESS)
 }
 
 #[cfg(not(feature = "viewer"))]
 fn view_output(_: &ViewOptions, _: PrintOptions) -> Result<ExitCode> {
-    Err(Error::Config("this build of gdt-batch has no server: build it with --features viewer".into()))
+    Err(sys::Error::Config("this build of gdt-batch has no server: build it with --features viewer".into()).into())
 }
 
 #[cfg(feature = "gpu")]
@@ -286,15 +295,15 @@ fn test_gpu(adapter: Option<&str>, leaves: Option<usize>, print: PrintOptions) -
     let check = gdt_batch::gpu_trial::run(adapter, leaves)?;
     print_result(&check, print)?;
     if check.holds() {
-        return Ok(ExitCode::from(u8::from(check.failure.is_some())));
+        return Ok(check.failure.map_or(ExitCode::SUCCESS, |_| ExitCode::from(exit_code(sys::ErrorKind::Retry))));
     }
     say("error: this GPU and the CPU disagree: see above; please report it");
-    Ok(ExitCode::from(4))
+    Ok(ExitCode::from(exit_code(sys::ErrorKind::Internal)))
 }
 
 #[cfg(not(feature = "gpu"))]
 fn test_gpu(_: Option<&str>, _: Option<usize>, _: PrintOptions) -> Result<ExitCode> {
-    Err(Error::Config("this build of gdt-batch uses no GPU: build it with the feature gpu".into()))
+    Err(sys::Error::Config("this build of gdt-batch uses no GPU: build it with the feature gpu".into()).into())
 }
 
 fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<ExitCode> {
@@ -310,21 +319,21 @@ fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<
 }
 
 /// Returns the files that a command line names: those of this machine, which must be there, and those that its URLs mean.
-fn named(files: &[PathBuf]) -> Result<Vec<PathBuf>> {
+fn named(files: &[PathBuf]) -> sys::Result<Vec<PathBuf>> {
     let of_one = |file: &PathBuf| match file.to_str() {
         Some(url) if points::is_url(url) => points::remote_files(url),
         _ if file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound) => {
-            Err(Error::Config(format!("there is no file {}: correct its name", file.display())))
+            Err(sys::Error::Config(format!("there is no file {}: correct its name", file.display())))
         }
         _ => Ok(vec![file.clone()]),
     };
-    Ok(files.iter().map(of_one).collect::<Result<Vec<_>>>()?.concat())
+    Ok(files.iter().map(of_one).collect::<sys::Result<Vec<_>>>()?.concat())
 }
 
 /// Prints a result for people or as JSON.
 fn print_result(result: &(impl Display + Serialize), print: PrintOptions) -> Result<()> {
     let text = if print.json {
-        serde_json::to_string_pretty(result).map_err(|e| Error::Broken(e.to_string()))?
+        serde_json::to_string_pretty(result).map_err(|e| sys::Error::Broken(e.to_string()))?
     } else if print.quiet {
         return Ok(());
     } else {
@@ -337,6 +346,6 @@ fn print_text(text: &str) -> Result<()> {
     match writeln!(std::io::stdout(), "{}", text.trim_end()) {
         // The reader has closed the pipe because it has read enough.
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
-        outcome => outcome.map_err(Error::io("write to", sys::error::STANDARD_OUTPUT)),
+        outcome => Ok(outcome.map_err(sys::Error::io("write to", sys::error::STANDARD_OUTPUT))?),
     }
 }

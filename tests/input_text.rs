@@ -10,7 +10,7 @@ use cloud::{Cloud, decode, file, lattice, read, read_bytes, read_with, rules, su
 use points::{FileFormat, Point, TextOptions, open};
 use proptest::prelude::*;
 use rust_decimal::Decimal;
-use sys::Result;
+use sys::{ErrorKind, Result};
 
 #[test]
 fn small_real_texts_of_every_layout_are_read() {
@@ -86,12 +86,12 @@ fn options_overrule_detection() {
     for (columns, words) in [(["x", "x", "y", "z"], "2 columns x"), (["x", "y", "a", "b"], "no column z")] {
         let options = TextOptions { columns: Some(columns.map(String::from).to_vec()), ..options.clone() };
         let error = read_with(&path, &options).err().unwrap();
-        assert!(error.exit_code() == 2 && error.to_string().contains(words), "{error}");
+        assert!(error.kind() == ErrorKind::Usage && error.to_string().contains(words), "{error}");
     }
     let delimiter = TextOptions { delimiter: Some('7'), ..TextOptions::default() };
     let comment = TextOptions { comment: Some("7".to_string()), ..TextOptions::default() };
     for options in [delimiter, comment] {
-        assert_eq!(read_with(&path, &options).err().unwrap().exit_code(), 2);
+        assert_eq!(read_with(&path, &options).err().unwrap().kind(), ErrorKind::Usage);
     }
     let path = file(".csv", b"-- x y z\n-1 2 3\n");
     let options = TextOptions { comment: Some("--".to_string()), ..TextOptions::default() };
@@ -130,11 +130,11 @@ fn a_file_that_is_not_a_table_is_refused() {
         ("565,000;933,012;12\n565,001;933,011;13\n", "between thousands"),
     ] {
         let error = text(content).err().unwrap_or_else(|| panic!("{content:?} was read"));
-        assert!(error.exit_code() == 3 && error.to_string().contains(words), "{content:?}: {error}");
+        assert!(error.kind() == ErrorKind::Input && error.to_string().contains(words), "{content:?}: {error}");
     }
     let error = read_bytes(".laz", b"LAZF and so on").err().unwrap();
     assert!(error.to_string().contains("LASF"), "{error}");
-    assert_eq!(read(Path::new("/nowhere/at/all.las")).err().unwrap().exit_code(), 1);
+    assert_eq!(read(Path::new("/nowhere/at/all.las")).err().unwrap().kind(), ErrorKind::Retry);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The file of a configuration that is to be written: whether it may be, and writing it whole or not at all.
 
+use crate::exit_code::exit_code;
 use crate::init::config_folder::named;
 use crate::init::configuration::FIRST_WORDS;
 use std::fs::{File, Metadata};
@@ -81,7 +82,7 @@ fn exists_already(file: &Path) -> Error {
 /// [`Error::Io`] if it cannot be written, [`Error::Config`] if it has come to be there and may not be replaced.
 pub(crate) fn write(file: &Path, text: &str, replace: bool) -> Result<()> {
     // A limit to the size of files must not leave half of one behind.
-    interrupt::listen()?;
+    interrupt::listen(exit_code)?;
     let failed = |error: std::io::Error| match error.kind() {
         ErrorKind::AlreadyExists => exists_already(file),
         _ => Error::io("write", file)(error),

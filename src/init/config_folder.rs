@@ -130,6 +130,7 @@ mod tests {
     use crate::config;
     use job::plan::inputs::input_paths;
     use std::fs;
+    use sys::ErrorKind;
 
     /// A folder that is not the current one.
     fn folder_in(root: &Path, name: &str) -> ConfigFolder {
@@ -192,7 +193,7 @@ mod tests {
     fn a_folder_that_is_not_there_is_refused() {
         let root = tempfile::tempdir().unwrap();
         let what = ConfigFolder::of(Some(&root.path().join("no/job.toml"))).err().unwrap();
-        assert!(what.exit_code() == 2 && what.to_string().contains("make it first"), "{what}");
+        assert!(what.kind() == ErrorKind::Usage && what.to_string().contains("make it first"), "{what}");
     }
 
     #[cfg(unix)]
@@ -207,6 +208,6 @@ mod tests {
         assert_eq!(here.name(&file).unwrap(), "a?[[]1[]].laz");
         fs::write(&other, "").unwrap();
         let what = here.name(&file).unwrap_err();
-        assert!(what.exit_code() == 2 && what.to_string().contains("rename it"), "{what}");
+        assert!(what.kind() == ErrorKind::Usage && what.to_string().contains("rename it"), "{what}");
     }
 }

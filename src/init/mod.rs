@@ -33,10 +33,10 @@ use job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use job::plan::inputs::input_paths;
 use job::preflight::check::Preflight;
 use job::progress::number_text::{grouped, mebibytes};
+use job::{Error, Result};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use sys::{Error, Result};
 
 pub use crate::init::draft::NeededLine;
 
@@ -80,15 +80,16 @@ pub struct NewConfiguration {
 /// Makes a configuration for the clouds that `clouds` name, and writes it to `file`, unless that is `-`.
 ///
 /// # Errors
-/// [`Error::Config`] if the file is there and may not be replaced, or there are no clouds; that of `check` if no configuration makes a job
-/// of them; [`Error::Io`] if it cannot be written. A file is replaced only if it is a configuration.
+/// [`sys::Error::Config`] if the file is there and may not be replaced, or there are no clouds; that of `check` if no configuration makes a
+/// job of them; [`sys::Error::Io`] if it cannot be written. A file is replaced only if it is a configuration.
 pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfiguration> {
     let file = Some(file).filter(|file| *file != Path::new(STANDARD_OUTPUT));
     if let Some(file) = file {
         check_may_be_written(file, replace)?;
     }
     let folder = ConfigFolder::of(file)?;
-    let NamedClouds { patterns, notes } = NamedClouds::of(clouds, &folder).map_err(with_way_out)?;
+    let NamedClouds { patterns, notes } =
+        NamedClouds::of(clouds, &folder).map_err(|error| with_way_out(error.into()))?;
     let draft = Draft::new(patterns, free_directory(&folder.path, file)?, &folder);
     if let Some(file) = file.filter(|file| file.exists()) {
         check_is_no_cloud(file, &input_paths(&draft.options()?.input)?)?;
@@ -113,7 +114,7 @@ pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfigu
 
 /// Returns an output directory in which nothing is in the way of a job, except the results of an earlier one. A configuration that is not
 /// called job.toml has one of its own, so that two of them can stand in one folder.
-fn free_directory(folder: &Path, file: Option<&Path>) -> Result<String> {
+fn free_directory(folder: &Path, file: Option<&Path>) -> sys::Result<String> {
     let stem = file.and_then(Path::file_stem).and_then(|stem| stem.to_str()).map_or("job".into(), plain);
     let first = if stem == "job" { DIRECTORY.to_string() } else { format!("{DIRECTORY}-{stem}") };
     let is_free = |name: &String| {

@@ -1,7 +1,7 @@
 //! Why no configuration makes a job of the clouds.
 
 use crate::init::draft::Draft;
-use sys::Error;
+use job::Error;
 
 /// What messages call the table of options that `init` never writes.
 const OF_TEXTS: &str = "[input.csv]";
@@ -29,7 +29,7 @@ impl Refusals {
         let last = self.0.last().map(|last| last.error.to_string()).unwrap_or_default();
         let mut all = self.0.into_iter();
         let Some(Refusal { error: first, .. }) = all.next() else {
-            return Error::Broken("init gave up without a reason".into());
+            return sys::Error::Broken("init gave up without a reason".into()).into();
         };
         match all.find(|later| later.error.to_string() == last) {
             Some(Refusal { lines, .. }) if first.to_string() != last => {
@@ -54,8 +54,8 @@ pub(crate) fn with_way_out(error: Error) -> Error {
 
 fn with_more(error: Error, more: &str) -> Error {
     match error {
-        Error::Input { path, what } => Error::Input { path, what: what + more },
-        Error::Config(what) => Error::Config(what + more),
+        Error::System(sys::Error::Input { path, what }) => sys::Error::Input { path, what: what + more }.into(),
+        Error::System(sys::Error::Config(what)) => sys::Error::Config(what + more).into(),
         Error::NoTerrain(what) => Error::NoTerrain(what + more),
         error => error,
     }
@@ -72,7 +72,7 @@ mod tests {
         let mut refusals = Refusals::default();
         for (keys, why) in reasons {
             let lines = keys.iter().map(|key| NeededLine::of_input(key, "a", ""));
-            refusals.add(&draft.with(lines), Error::Config((*why).into()));
+            refusals.add(&draft.with(lines), sys::Error::Config((*why).into()).into());
         }
         refusals.into_error().to_string()
     }
@@ -88,8 +88,8 @@ mod tests {
 
     #[test]
     fn advice_that_init_cannot_follow_comes_with_a_way() {
-        let what = with_way_out(Error::input("a.csv", "name them under [input.csv]")).to_string();
+        let what = with_way_out(sys::Error::input("a.csv", "name them under [input.csv]").into()).to_string();
         assert!(what.contains("yourself") && what.contains("columns = "), "{what}");
-        assert_eq!(with_way_out(Error::Config("x".into())).to_string(), "x");
+        assert_eq!(with_way_out(sys::Error::Config("x".into()).into()).to_string(), "x");
     }
 }

@@ -12,10 +12,10 @@ use job::plan::job_plan::{Plan, PlannedInput};
 use job::plan::no_points::{no_point_is_left, no_triangle};
 use job::plan::text_inputs::{allowed_malformed, count, stop_at};
 use job::preflight::check::{Preflight, inspect};
+use job::{Error, Result};
 use points::Source;
 use rayon::prelude::*;
 use std::io::ErrorKind;
-use sys::{Error, Result};
 
 /// A configuration that runs, and what `check` says of it.
 pub(crate) struct Runnable {
@@ -52,16 +52,16 @@ pub(crate) fn runnable(draft: Draft) -> Result<Runnable> {
                     Some(ways) => ways.after_stray_points().or_else(allowed),
                     None => allowed(),
                 };
-                (damage.error, next)
+                (damage.error.into(), next)
             }
-            Err(error @ Error::Input { .. }) => {
+            Err(Error::System(error @ sys::Error::Input { .. })) => {
                 let next = match lines_for_bad_files(&now)? {
                     Some(lines) => Some(now.with(lines)),
                     None => line_for_far_points(&now, &error).map(|line| now.with([line])),
                 };
-                (error, next)
+                (error.into(), next)
             }
-            Err(error @ Error::Config(_)) => {
+            Err(error @ Error::System(sys::Error::Config(_))) => {
                 let ways = match &mut ways {
                     Some(ways) => ways,
                     None => ways.insert(CrsAttempts::of(&now)?),
@@ -102,19 +102,19 @@ fn trial(draft: &Draft) -> Result<Trial> {
 }
 
 /// Returns the line that lets the job leave out points far from all others; `None` if `error` is none that such points cause.
-fn line_for_far_points(draft: &Draft, error: &Error) -> Option<NeededLine> {
+fn line_for_far_points(draft: &Draft, error: &sys::Error) -> Option<NeededLine> {
     let any = NeededLine::of_input("max_malformed_fraction", 1.0, "");
     let allowing = Some(draft.with([any])).filter(|_| !draft.sets("max_malformed_fraction"))?;
     let (_, plan) = inspect(&allowing.options().ok()?).ok()?;
     let counts = |input: &PlannedInput| count(&input.source, &input.rules).map(|counts| counts.malformed);
-    let malformed = plan.inputs.par_iter().map(counts).collect::<Result<Vec<_>>>().ok()?.into_iter().sum();
+    let malformed = plan.inputs.par_iter().map(counts).collect::<sys::Result<Vec<_>>>().ok()?.into_iter().sum();
     line_for_malformed(draft, [malformed, plan.records], error)
 }
 
 /// Reads all points, and returns how many records are damaged if they are more than the options allow.
-fn damage(plan: &Plan) -> Result<Option<Damage>> {
+fn damage(plan: &Plan) -> sys::Result<Option<Damage>> {
     let count = |input: &PlannedInput| count(&input.source, &input.rules);
-    let counts = plan.inputs.par_iter().map(count).collect::<Result<Vec<_>>>()?;
+    let counts = plan.inputs.par_iter().map(count).collect::<sys::Result<Vec<_>>>()?;
     let malformed = counts.iter().map(|counts| counts.malformed).sum();
     if malformed <= allowed_malformed(plan.options.input.max_malformed_fraction.0, plan.records) {
         return Ok(None);
@@ -151,7 +151,7 @@ fn why_it_stops(draft: &Draft) -> Option<Error> {
     }
     match trial(&draft.undecided()) {
         Ok(Trial::Runs(_)) => None,
-        Ok(Trial::Damaged(damage)) => Some(damage.error),
+        Ok(Trial::Damaged(damage)) => Some(damage.error.into()),
         Err(error) => Some(error),
     }
 }
@@ -159,13 +159,13 @@ fn why_it_stops(draft: &Draft) -> Option<Error> {
 /// Returns lines of which one may let a job fit, the mildest first.
 fn lines_for_memory(obstacle: &Error, threads: usize) -> Vec<NeededLine> {
     match obstacle {
-        Error::Memory(_) => {
+        Error::System(sys::Error::Memory(_)) => {
             let why = "With more threads the job takes more memory than this machine has free.";
             let fewer = std::iter::successors(Some(threads / 2), |threads| Some(threads / 2));
             let fewer = fewer.take_while(|threads| *threads > 0);
             fewer.map(|threads| NeededLine::of_limits("threads", threads as i64, why)).collect()
         }
-        Error::Io { source, .. } if source.kind() == ErrorKind::StorageFull => {
+        Error::System(sys::Error::Io { source, .. }) if source.kind() == ErrorKind::StorageFull => {
             let why = "With all finished steps the job takes more disk than is free. Without them an interrupted job cannot go on with \
                        another style.";
             vec![NeededLine::of_limits("keep_steps", false, why)]

@@ -1,7 +1,7 @@
 //! What lets a job run though some heights may stand for nodata: leaving them out.
 
 use crate::init::draft::{Draft, NeededLine};
-use sys::Error;
+use job::Error;
 
 /// What a message has before the height.
 const ADVICE: &str = "[input] nodata = ";

@@ -4,6 +4,7 @@ use super::*;
 use crate::config;
 use job::preflight::check::check;
 use std::fs;
+use sys::ErrorKind;
 
 /// Makes the configuration of the clouds in `folder`.
 fn made(folder: &Path) -> NewConfiguration {
@@ -133,7 +134,7 @@ fn what_is_needed_stands_there_with_its_reason() {
         new.text
     );
     let why = new.obstacle.unwrap();
-    assert!(why.exit_code() == 3 && why.to_string().contains("b.csv: is a Git LFS pointer"), "{why}");
+    assert!(why.kind() == ErrorKind::Input && why.to_string().contains("b.csv: is a Git LFS pointer"), "{why}");
     let decided = new.text.replace("#max_malformed", "max_malformed").replace("#on_bad_file", "on_bad_file");
     check(&config::of_text(&decided, folder.path()).unwrap()).unwrap();
 }

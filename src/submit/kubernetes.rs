@@ -4,6 +4,8 @@
 //! ten seconds at first, then after twice as long each time, up to some minutes. Nothing waits in a pod, so phases that come later
 //! never take the room of those that come first.
 
+use crate::error::{Error, Result};
+use crate::exit_code::exit_code;
 use crate::submit::request::Request;
 use crate::submit::submitted::{SentTasks, Submitted};
 use clap::Parser;
@@ -12,7 +14,6 @@ use serde_json::{Value, json};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
-use sys::{Error, Result};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// The name of the engine.
@@ -22,7 +23,8 @@ pub(super) const ENGINE: &str = "kubernetes";
 const RETRIES: u32 = 400;
 
 /// The exit codes after which another try ends in the same way.
-const FINAL_EXIT_CODES: [u8; 3] = [2, 3, 4];
+const FINAL_EXIT_CODES: [u8; 3] =
+    [exit_code(sys::ErrorKind::Usage), exit_code(sys::ErrorKind::Input), exit_code(sys::ErrorKind::Internal)];
 
 /// The seconds that a task has to stop when it is asked to.
 const GRACE_SECONDS: u32 = 60;
@@ -88,15 +90,15 @@ fn cores(text: &str) -> std::result::Result<u16, String> {
 /// Returns the Jobs for the tasks of `request` as YAML.
 ///
 /// # Errors
-/// [`Error::Config`] if the options that the user has `added` are wrong.
-pub fn show(request: &Request, added: &[String]) -> Result<String> {
+/// [`sys::Error::Config`] if the options that the user has `added` are wrong.
+pub fn show(request: &Request, added: &[String]) -> sys::Result<String> {
     yaml(&jobs(request, &KubernetesOptions::read(request, added)?))
 }
 
 /// Gives the Jobs for the tasks of `request` to `kubectl apply`.
 ///
 /// # Errors
-/// [`Error::Config`] if the options that the user has `added` are wrong or there is no `kubectl`, [`Error::Engine`] if it refuses.
+/// [`sys::Error::Config`] if the options that the user has `added` are wrong or there is no `kubectl`, [`Error::Engine`] if it refuses.
 pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
     let options = KubernetesOptions::read(request, added)?;
     nothing_is_there(request, &options)?;
@@ -111,11 +113,11 @@ pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
 }
 
 impl KubernetesOptions {
-    fn read(request: &Request, added: &[String]) -> Result<KubernetesOptions> {
-        let options = KubernetesOptions::try_parse_from(added).map_err(|e| Error::Config(e.to_string()))?;
+    fn read(request: &Request, added: &[String]) -> sys::Result<KubernetesOptions> {
+        let options = KubernetesOptions::try_parse_from(added).map_err(|e| sys::Error::Config(e.to_string()))?;
         let config = options.config_in_pods(request);
         if options.volume_of(&config).is_none() {
-            return Err(Error::Config(format!(
+            return Err(sys::Error::Config(format!(
                 "no volume of the pods has the configuration {config}: name its path in the pods with -- --config FILE"
             )));
         }
@@ -247,9 +249,9 @@ fn pod_command(config: &str, request: &Request, PhaseTasks { phase, count, missi
     words(&["/bin/sh", "-c", &script, config])
 }
 
-fn yaml(jobs: &[Value]) -> Result<String> {
-    let text = |job: &Value| yaml_serde::to_string(job).map_err(|e| Error::Broken(e.to_string()));
-    let documents = jobs.iter().map(text).collect::<Result<Vec<String>>>()?;
+fn yaml(jobs: &[Value]) -> sys::Result<String> {
+    let text = |job: &Value| yaml_serde::to_string(job).map_err(|e| sys::Error::Broken(e.to_string()));
+    let documents = jobs.iter().map(text).collect::<sys::Result<Vec<String>>>()?;
     Ok(documents.join("---\n"))
 }
 
@@ -292,17 +294,18 @@ fn kubectl(options: &KubernetesOptions, arguments: &[&str], input: &str) -> Resu
     command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = match command.spawn() {
         Err(e) if e.kind() == ErrorKind::NotFound => {
-            return Err(Error::Config(
+            return Err(sys::Error::Config(
                 "there is no kubectl here: with --dry-run, submit prints what it would get".into(),
-            ));
+            )
+            .into());
         }
-        child => child.map_err(Error::io("run", "kubectl"))?,
+        child => child.map_err(sys::Error::io("run", "kubectl"))?,
     };
     if let Some(mut pipe) = child.stdin.take() {
         // If kubectl has ended already, it says why.
         let _ = pipe.write_all(input.as_bytes());
     }
-    let output = child.wait_with_output().map_err(Error::io("run", "kubectl"))?;
+    let output = child.wait_with_output().map_err(sys::Error::io("run", "kubectl"))?;
     if !output.status.success() {
         return Err(Error::Engine(format!("kubectl: {}", String::from_utf8_lossy(&output.stderr).trim())));
     }
@@ -399,7 +402,7 @@ mod tests {
     fn cores_are_a_number_that_a_pod_can_have() {
         for wrong in ["0", "-2", "1025", "two", "0.5", ""] {
             let error = show(&request("/data/job.toml", 2), &words(&["--cpu", wrong])).unwrap_err();
-            assert_eq!(error.exit_code(), 2, "{wrong}");
+            assert_eq!(error.kind(), sys::ErrorKind::Usage, "{wrong}");
             assert!(error.to_string().contains("a whole number from 1 to 1024"), "{wrong}: {error}");
         }
         let job = read(&request("/data/job.toml", 2), &["--cpu", "8"]).remove(2);
@@ -473,6 +476,6 @@ mod tests {
         assert!(error("/data/job.toml", &[]).to_string().contains("--image"));
         assert!(error("/data/job.toml", &words(&["--volume", "data"])).to_string().contains("survey-data:/data"));
         let unseen = error("/home/me/job.toml", &words(&[]));
-        assert!(unseen.to_string().contains("--config") && unseen.exit_code() == 2, "{unseen}");
+        assert!(unseen.to_string().contains("--config") && unseen.kind() == sys::ErrorKind::Usage, "{unseen}");
     }
 }

@@ -1,13 +1,15 @@
 //! The engine "local": the tasks of a job as processes of this program on this machine, phase after phase. For tests, and for machines
 //! without a scheduler.
 
+use crate::error::{Error, Result};
+use crate::exit_code::exit_code;
 use crate::shell_word::quoted;
 use crate::submit::request::Request;
 use job::phase::{Phase, PhaseTasks};
 use std::ffi::OsString;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
-use sys::{Error, Result, interrupt, say, threads};
+use sys::{ErrorKind, interrupt, say, threads};
 
 /// How often the engine looks whether a task has ended.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -37,11 +39,11 @@ impl<'a> LocalEngine<'a> {
     /// Returns the engine for `request`. It takes no options that the user could have `added`.
     ///
     /// # Errors
-    /// [`Error::Config`] if the user has added some.
-    pub fn new(request: &'a Request, added: &[String], quiet: bool, json: bool) -> Result<LocalEngine<'a>> {
+    /// [`sys::Error::Config`] if the user has added some.
+    pub fn new(request: &'a Request, added: &[String], quiet: bool, json: bool) -> sys::Result<LocalEngine<'a>> {
         match added.first() {
             None => Ok(LocalEngine { request, quiet, json }),
-            Some(option) => Err(Error::Config(format!("{option}: the engine local takes no options after --"))),
+            Some(option) => Err(sys::Error::Config(format!("{option}: the engine local takes no options after --"))),
         }
     }
 
@@ -63,8 +65,9 @@ impl<'a> LocalEngine<'a> {
     /// `missing` tells which tasks have something to do: only these are started, however many there are.
     ///
     /// # Errors
-    /// [`Error::Tasks`] if tasks fail, [`Error::Interrupted`], [`Error::Io`] if a process cannot be started, and those of `missing`.
-    pub fn run(&self, missing: impl FnOnce() -> Result<Vec<PhaseTasks>>) -> Result<()> {
+    /// [`Error::Tasks`] if tasks fail, [`sys::Error::Interrupted`], [`sys::Error::Io`] if a process cannot be started, and those of
+    /// `missing`.
+    pub fn run(&self, missing: impl FnOnce() -> sys::Result<Vec<PhaseTasks>>) -> Result<()> {
         match self.request.phases.split_first() {
             Some((plan, _)) if plan.phase == Phase::Plan => {
                 self.run_phase(plan)?;
@@ -93,7 +96,9 @@ impl<'a> LocalEngine<'a> {
             std::thread::sleep(PAUSE);
             let mut ended = Vec::new();
             for task in &mut running {
-                if let Some(status) = task.child.try_wait().map_err(Error::io("wait for", &self.request.program))? {
+                if let Some(status) =
+                    task.child.try_wait().map_err(sys::Error::io("wait for", &self.request.program))?
+                {
                     ended.push((task.number, status));
                 }
             }
@@ -121,7 +126,7 @@ impl<'a> LocalEngine<'a> {
         if !self.quiet && phase.missing.first() == Some(&task) {
             say(&format!("phase {}: {} of {} tasks", phase.phase, phase.missing.len(), phase.count));
         }
-        let child = command.spawn().map_err(Error::io("start", &self.request.program))?;
+        let child = command.spawn().map_err(sys::Error::io("start", &self.request.program))?;
         Ok(RunningTask { number: task, child })
     }
 
@@ -154,5 +159,5 @@ impl<'a> LocalEngine<'a> {
 
 /// Returns the exit code of a task. One that a signal has ended may be tried again.
 fn code_of(status: ExitStatus) -> u8 {
-    status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
+    status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(exit_code(ErrorKind::Retry))
 }

@@ -1,5 +1,6 @@
 //! Sending tasks to Slurm, by its commands.
 
+use crate::error::{Error, Result};
 use crate::submit::request::Request;
 use crate::submit::slurm_script::{Array, ENGINE, Script, arrays, dry_run, scripts, sent_path};
 use crate::submit::submitted::{SentTasks, Submitted};
@@ -8,7 +9,7 @@ use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use sys::{Error, Result, disk};
+use sys::disk;
 
 /// `MaxArraySize` where nobody sets it.
 const DEFAULT_LIMIT: u32 = 1001;
@@ -16,8 +17,8 @@ const DEFAULT_LIMIT: u32 = 1001;
 /// Sends the tasks of `request` with the options of `sbatch` that the user has `added`.
 ///
 /// # Errors
-/// [`Error::Config`] if Slurm's commands are missing or an option cannot be added, [`Error::Engine`] if Slurm refuses or an earlier
-/// submission is still queued, [`Error::Io`] if a script cannot be written.
+/// [`sys::Error::Config`] if Slurm's commands are missing or an option cannot be added, [`Error::Engine`] if Slurm refuses or an earlier
+/// submission is still queued, [`sys::Error::Io`] if a script cannot be written.
 pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
     check_options(added)?;
     let limit = max_array_size()?;
@@ -25,12 +26,12 @@ pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
     nothing_is_queued(&sent)?;
     let arrays = arrays(request, limit);
     for folder in arrays.iter().flatten().map(|array| array.logs(request)) {
-        disk::create_folder(&folder).map_err(Error::io("create the directory", &folder))?;
+        disk::create_folder(&folder).map_err(sys::Error::io("create the directory", &folder))?;
     }
     for Script { path, text } in scripts(request) {
-        fs::write(&path, text).map_err(Error::io("write", &path))?;
+        fs::write(&path, text).map_err(sys::Error::io("write", &path))?;
     }
-    let mut numbers = File::create(&sent).map_err(Error::io("create", &sent))?;
+    let mut numbers = File::create(&sent).map_err(sys::Error::io("create", &sent))?;
     let (mut jobs, mut after) = (Vec::new(), Vec::new());
     for arrays in arrays {
         let mut of_phase = Vec::new();
@@ -38,7 +39,7 @@ pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
             let sent_before = || jobs.iter().map(|sent: &SentTasks| sent.job.as_str()).collect::<Vec<&str>>();
             let job = send_array(&array, request, &after, added).map_err(|e| with_queued(e, &sent_before()))?;
             // At once: if the next call fails, this one is queued all the same.
-            writeln!(numbers, "{job}").map_err(Error::io("write to", &sent))?;
+            writeln!(numbers, "{job}").map_err(sys::Error::io("write to", &sent))?;
             of_phase.push(job.clone());
             jobs.push(sent_tasks(array, job));
         }
@@ -50,21 +51,23 @@ pub fn send(request: &Request, added: &[String]) -> Result<Submitted> {
 /// Returns what [`send`] would do, as a script of the shell.
 ///
 /// # Errors
-/// [`Error::Config`] if an option cannot be added.
+/// [`sys::Error::Config`] if an option cannot be added.
 pub fn show(request: &Request, added: &[String]) -> Result<String> {
     check_options(added)?;
     Ok(dry_run(request, max_array_size().unwrap_or(DEFAULT_LIMIT), added))
 }
 
 /// Checks that the user adds no option that says which tasks run, and when.
-fn check_options(added: &[String]) -> Result<()> {
+fn check_options(added: &[String]) -> sys::Result<()> {
     let is_ours = |word: &&String| {
         ["--array", "--dependency", "--wrap"].iter().any(|name| word.starts_with(name))
             || ["-a", "-d"].iter().any(|name| word.starts_with(name) && !word.starts_with("--"))
     };
     match added.iter().find(is_ours) {
         None => Ok(()),
-        Some(word) => Err(Error::Config(format!("{word}: submit itself says to sbatch which tasks run, and when"))),
+        Some(word) => {
+            Err(sys::Error::Config(format!("{word}: submit itself says to sbatch which tasks run, and when")))
+        }
     }
 }
 
@@ -73,7 +76,9 @@ fn max_array_size() -> Result<u32> {
     let config = output_of("scontrol", &["show".into(), "config".into()])?;
     limit_in(&config).ok_or_else(|| Error::Engine("scontrol show config says nothing of MaxArraySize".into())).and_then(
         |limit| match limit {
-            0 | 1 => Err(Error::Config("this Slurm allows no arrays: its MaxArraySize must be 2 or more".into())),
+            0 | 1 => {
+                Err(sys::Error::Config("this Slurm allows no arrays: its MaxArraySize must be 2 or more".into()).into())
+            }
             limit => Ok(limit),
         },
     )
@@ -88,7 +93,7 @@ fn limit_in(config: &str) -> Option<u32> {
 fn nothing_is_queued(sent: &Path) -> Result<()> {
     let earlier = match fs::read_to_string(sent) {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
-        text => text.map_err(Error::io("read", sent))?,
+        text => text.map_err(sys::Error::io("read", sent))?,
     };
     let queue = output_of("squeue", &["--noheader", "--me", "--format=%F"].map(String::from))?;
     let queued: HashSet<&str> = queue.lines().map(str::trim).collect();
@@ -133,11 +138,12 @@ fn sent_tasks(array: Array, job: String) -> SentTasks {
 fn output_of(command: &'static str, arguments: &[String]) -> Result<String> {
     let output = match Command::new(command).args(arguments).output() {
         Err(e) if e.kind() == ErrorKind::NotFound => {
-            return Err(Error::Config(format!(
+            return Err(sys::Error::Config(format!(
                 "there is no {command} here: run this where Slurm's commands are, or take --engine local"
-            )));
+            ))
+            .into());
         }
-        output => output.map_err(Error::io("run", PathBuf::from(command)))?,
+        output => output.map_err(sys::Error::io("run", PathBuf::from(command)))?,
     };
     let said = String::from_utf8_lossy(&output.stderr);
     if !output.status.success() {
@@ -159,9 +165,9 @@ mod tests {
 
     #[test]
     fn options_that_say_which_tasks_run_are_refused() {
-        let check = |option: &str| check_options(&[option.into()]).map_err(|e| e.exit_code());
+        let check = |option: &str| check_options(&[option.into()]).map_err(|e| e.kind());
         for wrong in ["--array=1-3", "--dependency=singleton", "-a1", "-d", "--wrap=true"] {
-            assert_eq!(check(wrong), Err(2), "{wrong}");
+            assert_eq!(check(wrong), Err(sys::ErrorKind::Usage), "{wrong}");
         }
         for right in ["--time=1:00:00", "-Along", "--account=a", "-N1", "--cpus-per-task=8"] {
             assert_eq!(check(right), Ok(()), "{right}");

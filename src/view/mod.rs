@@ -16,11 +16,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use crate::error::{Error, Result};
 use crate::view::hosts::Hosts;
 use crate::view::results::Results;
 use crate::view::server::Server;
 use crate::view::site::Site;
-use sys::{Error, Result};
 use tiles::file_names::OutputFiles;
 use tiles::page::page_for;
 
@@ -43,13 +43,13 @@ impl View {
     /// names `hosts` too.
     ///
     /// # Errors
-    /// [`Error::Config`] if no job has written to the directory, the page is not built in, or the address is not one of this machine.
-    /// [`Error::Unfinished`] if the job is not done. [`Error::Port`] if another program has the port.
+    /// [`sys::Error::Config`] if no job has written to the directory, the page is not built in, or the address is not one of this machine.
+    /// [`verify::Error::Unfinished`] if the job is not done. [`Error::Port`] if another program has the port.
     pub fn open(directory: &Path, wanted: SocketAddr, hosts: &[String]) -> Result<View> {
         let terrain = terrain_in(directory)?;
-        let root = directory.canonicalize().map_err(Error::io("read", directory))?;
+        let root = directory.canonicalize().map_err(sys::Error::io("read", directory))?;
         let listener = TcpListener::bind(wanted).map_err(|error| not_listening(wanted, &error))?;
-        let bound = listener.local_addr().map_err(Error::io("listen on", wanted.to_string()))?;
+        let bound = listener.local_addr().map_err(sys::Error::io("listen on", wanted.to_string()))?;
         let site = Site { results: Results::new(&root), root, page: page_for(terrain)?, hosts: Hosts::new(hosts) };
         // An address such as 0.0.0.0 stands for all of this machine.
         let shown = if wanted.ip().is_unspecified() { "localhost".into() } else { ip_text(wanted.ip()) };
@@ -64,8 +64,8 @@ impl View {
     /// Answers browsers until the process is asked to stop.
     ///
     /// # Errors
-    /// [`Error::Io`] if the system closes the port.
-    pub fn run(&self) -> Result<()> {
+    /// [`sys::Error::Io`] if the system closes the port.
+    pub fn run(&self) -> sys::Result<()> {
         self.server.run()
     }
 }
@@ -98,12 +98,13 @@ fn terrain_in(directory: &Path) -> Result<&'static str> {
         return Ok("terrain.glb");
     }
     if files.journal().is_file() {
-        return Err(Error::Unfinished { directory: directory.into() });
+        return Err(verify::Error::Unfinished { directory: directory.into() }.into());
     }
-    Err(Error::Config(format!(
+    Err(sys::Error::Config(format!(
         "{} has neither tileset.json nor terrain.glb: name the [output] directory of a job that is done",
         directory.display()
-    )))
+    ))
+    .into())
 }
 
 fn not_listening(address: SocketAddr, error: &std::io::Error) -> Error {
@@ -111,8 +112,12 @@ fn not_listening(address: SocketAddr, error: &std::io::Error) -> Error {
     let port = address.port();
     match error.kind() {
         AddrInUse => Error::Port(format!("another program has port {port}: give another one with --port, or none")),
-        PermissionDenied => Error::Config(format!("port {port} is for the system only: give --port 1024 or more")),
-        _ => Error::Config(format!("cannot listen on {address}: {error}; give an --address of this machine")),
+        PermissionDenied => {
+            sys::Error::Config(format!("port {port} is for the system only: give --port 1024 or more")).into()
+        }
+        _ => {
+            sys::Error::Config(format!("cannot listen on {address}: {error}; give an --address of this machine")).into()
+        }
     }
 }
 
@@ -136,7 +141,7 @@ mod tests {
         assert_eq!(error(&folder.path().join("nowhere"), 0).exit_code(), 2);
         std::fs::create_dir(folder.path().join("job")).unwrap();
         std::fs::write(folder.path().join("job/journal"), "").unwrap();
-        assert!(matches!(error(folder.path(), 0), Error::Unfinished { .. }));
+        assert!(matches!(error(folder.path(), 0), Error::Verify(verify::Error::Unfinished { .. })));
     }
 
     #[test]

@@ -19,6 +19,7 @@ use delaunay_gpu::triangulator::Triangulator;
 use job::progress::stage::ProgressOutput;
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use sys::ErrorKind;
 use verify::verify;
 
 const MEMORY: u64 = 1 << 30;
@@ -167,7 +168,7 @@ fn a_wrong_answer_never_makes_a_wrong_mesh() {
 fn a_gpu_that_does_not_exist_is_an_error_if_required_and_none_otherwise() {
     let nameless = GpuOptions { adapter: Some("no GPU has this name".into()), ..GpuOptions::default() };
     let error = Triangulator::new(&settings(Backend::Gpu), &nameless, MEMORY).err().expect("there is no such GPU");
-    assert_eq!(error.exit_code(), 2);
+    assert_eq!(error.kind(), ErrorKind::Usage);
     assert!(error.to_string().contains("no GPU has this name"), "{error}");
     let optional = Triangulator::new(&settings(Backend::Auto), &nameless, MEMORY).unwrap();
     optional.prepare(u64::MAX, 1);

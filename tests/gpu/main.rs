@@ -16,5 +16,5 @@ mod linked;
 mod placed;
 mod predicates;
 mod random;
-mod rig;
 mod reference_kernels;
+mod rig;

@@ -3,7 +3,7 @@
 use delaunay::geometry::REACH;
 use lattice::Lattice;
 use points::{OptionalFields, Point, RawBounds, TextOptions, open};
-use sys::Error;
+use sys::{Error, ErrorKind};
 
 use crate::cloud::{decode, file, lattice, rules};
 use crate::las_file::LasFile;
@@ -63,7 +63,7 @@ fn an_error_of_the_sink_stops_the_decoding() {
     let source = open(&path, &TextOptions::default()).unwrap();
     let rules = rules(&source, &lattice(&source));
     let refuse = &mut |_: &[Point]| Err(Error::Memory("none left".to_string()));
-    assert_eq!(source.decode(0, &rules, refuse).unwrap_err().exit_code(), 1);
+    assert_eq!(source.decode(0, &rules, refuse).unwrap_err().kind(), ErrorKind::Retry);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use job::progress::stage::ProgressOutput;
 
 use crate::clouds;
 use crate::program::{Job, Said, gdt_batch, number};
+use sys::ErrorKind;
 
 #[track_caller]
 fn stays_within(report: &Value, mebibytes: u64) {
@@ -117,7 +118,7 @@ fn one_raise_of_the_memory_suffices_for_points_that_no_tile_can_decide() {
     // Less than a configuration may say, so that few points are too many.
     options.limits.memory.0 = 11 << 20;
     let error = job::run(&options, ProgressOutput::Quiet).unwrap_err();
-    assert_eq!(error.exit_code(), 1);
+    assert_eq!(error.kind(), ErrorKind::Retry);
     let said = error.to_string();
     assert!(said.contains("no tile can decide") && said.contains("finished steps are kept"), "{said}");
     let (_, after) = said.split_once("set memory = \"").unwrap();

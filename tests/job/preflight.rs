@@ -9,6 +9,7 @@ use job::preflight::check::Preflight;
 use crate::clouds;
 use crate::las_file::{LasFile, points_at};
 use crate::program::{Job, number};
+use sys::ErrorKind;
 
 fn small_job(folder: &Path) -> Job {
     let file = clouds::write(folder, "cloud.csv", &clouds::uniform(100_000, 1_000_000, 4));
@@ -22,14 +23,26 @@ fn a_job_refused_for_disk_or_memory_may_be_retried_and_one_below_a_file_not() {
     preflight.passes().unwrap();
     let need = preflight.disk;
     let below_a_file = folder.path().join("cloud.csv/out");
-    for (lacking, code, words) in [
-        (Preflight { disk_free: Some(need - 1), ..preflight.clone() }, 1, ["make room or choose another", "--force"]),
-        (Preflight { memory_free: Some(1 << 20), ..preflight.clone() }, 1, ["lower [limits] threads", "--force"]),
+    for (lacking, kind, words) in [
+        (
+            Preflight { disk_free: Some(need - 1), ..preflight.clone() },
+            ErrorKind::Retry,
+            ["make room or choose another", "--force"],
+        ),
+        (
+            Preflight { memory_free: Some(1 << 20), ..preflight.clone() },
+            ErrorKind::Retry,
+            ["lower [limits] threads", "--force"],
+        ),
         // No retry can make a folder below a file.
-        (Preflight { output: below_a_file, ..preflight.clone() }, 2, ["cannot write to", "cloud.csv/out"]),
+        (
+            Preflight { output: below_a_file, ..preflight.clone() },
+            ErrorKind::Usage,
+            ["cannot write to", "cloud.csv/out"],
+        ),
     ] {
         let error = lacking.passes().unwrap_err();
-        assert_eq!(error.exit_code(), code, "{error}");
+        assert_eq!(error.kind(), kind, "{error}");
         assert!(words.iter().all(|word| error.to_string().contains(word)), "{error}");
     }
     Preflight { disk_free: Some(need), memory_free: None, ..preflight }.passes().unwrap();

@@ -92,7 +92,7 @@ fn ended(test: &str) -> (Option<i32>, String) {
 fn is_child() -> bool {
     let is_child = std::env::var_os("GDT_TEST_ABORT").is_some();
     if is_child {
-        sys::shortage::listen().unwrap();
+        sys::shortage::listen(gdt_batch::exit_code::exit_code).unwrap();
     }
     is_child
 }

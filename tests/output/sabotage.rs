@@ -4,6 +4,7 @@ use tiles::Tile;
 use verify::{Verdict, verify};
 
 use crate::model::{COMPRESSIONS, cloud, cut_by_place, edges, grid, terrain, utm, write_tiles, write_tiles_as};
+use sys::ErrorKind;
 
 /// Returns what verification finds in nine good tiles after `harm`. It is the same for every compression.
 fn failures(harm: impl FnOnce(&mut Vec<Tile>)) -> String {
@@ -240,7 +241,7 @@ fn a_directory_without_tiles_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let refused = |path: &std::path::Path, words: &str| {
         let error = verify(path, 1 << 28).unwrap_err();
-        assert!(error.exit_code() == 2 && error.to_string().contains(words), "{error}");
+        assert!(error.kind() == ErrorKind::Usage && error.to_string().contains(words), "{error}");
         assert!(error.to_string().contains("output directory of a finished job"), "{error}");
     };
     refused(&directory.path().join("none"), "none is not there");

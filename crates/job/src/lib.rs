@@ -8,6 +8,7 @@
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 pub mod durable;
+mod error;
 pub mod index;
 pub mod levels;
 pub(crate) mod machine;
@@ -24,6 +25,8 @@ pub mod records;
 pub mod report;
 pub mod run;
 pub mod tiles;
+
+pub use crate::error::{Error, Result};
 
 use crate::index::{NodeIndex, PartIndex};
 use crate::levels::make_level::Child;
@@ -50,7 +53,6 @@ use crate::run::run_context::RunContext;
 use crate::run::{parts, read_step, tasks};
 use std::time::SystemTime;
 use sys::threads::run_concurrently;
-use sys::{Error, Result};
 
 /// Runs the whole job, or what an interrupted run left of it.
 ///
@@ -76,16 +78,16 @@ pub fn work(options: &JobOptions, run: impl Into<RunOptions>, phase: Phase, task
 /// plan of this job, and none if its results are in place.
 ///
 /// # Errors
-/// [`Error::Config`] if there are no inputs, [`Error::Io`] if one of them, or a journal, cannot be read.
-pub fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
+/// [`sys::Error::Config`] if there are no inputs, [`sys::Error::Io`] if one of them, or a journal, cannot be read.
+pub fn missing_tasks(options: &JobOptions, tasks: u32) -> sys::Result<Vec<PhaseTasks>> {
     tasks::missing::missing_tasks(options, tasks)
 }
 
 /// As [`missing_tasks`], of a job that has just been planned: its phase `plan` is not missing.
 ///
 /// # Errors
-/// [`Error::Io`] or [`Error::Broken`] on the job directory.
-pub fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
+/// [`sys::Error::Io`] or [`sys::Error::Broken`] on the job directory.
+pub fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> sys::Result<Vec<PhaseTasks>> {
     tasks::missing::missing_tasks_of_planned(options, tasks)
 }
 
@@ -98,8 +100,8 @@ pub fn new_submission() -> u64 {
 /// Returns how far the job is. If `tasks` is given, also which tasks are missing, where phases are dealt out to so many.
 ///
 /// # Errors
-/// [`Error::Io`] or [`Error::Broken`] on the job directory.
-pub fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStatus> {
+/// [`sys::Error::Io`] or [`sys::Error::Broken`] on the job directory.
+pub fn status(options: &JobOptions, tasks: Option<u32>) -> sys::Result<JobStatus> {
     tasks::status::status(options, tasks)
 }
 
@@ -117,7 +119,8 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
     // Steps 3 and 4, mesh/: leaves and merges. Steps 5 and 6, tiles/: border normals and tiles, each as soon as it is finished.
     let mesh = mesh_and_tiles(run, &plan, &partition, bounds)?;
     let tiles = &mesh.tiles;
-    let appearance = tiles.appearance.as_ref().ok_or_else(|| Error::Broken("the tiles have no appearance".into()))?;
+    let appearance =
+        tiles.appearance.as_ref().ok_or_else(|| sys::Error::Broken("the tiles have no appearance".into()))?;
     some_triangles(&tiles.stats, &plan)?;
     // From here on the store is enough.
     run_concurrently(
@@ -151,12 +154,12 @@ fn walk(run: &RunContext, plan: Plan, earlier: Option<Partition>) -> Result<Repo
                 peak_memory: None,
                 cpu_s_of_tasks: 0.0,
             };
-            write_report(run, &plan, figures, published)
+            Ok(write_report(run, &plan, figures, published)?)
         },
     )
 }
 
 /// In a job of one part no tile needs another.
-fn no_other_part(part: PartIndex) -> Result<Child> {
-    Err(Error::Broken(format!("there is no part {part}")))
+fn no_other_part(part: PartIndex) -> sys::Result<Child> {
+    Err(sys::Error::Broken(format!("there is no part {part}")))
 }

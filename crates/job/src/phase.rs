@@ -172,6 +172,7 @@ impl fmt::Display for Task {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sys::ErrorKind;
 
     #[test]
     fn names_are_those_of_the_command_line() {
@@ -194,25 +195,25 @@ mod tests {
     fn array_jobs_name_their_tasks() {
         let task = |count: Option<u32>, set: &[(&str, &str)]| {
             let variable = |name: &str| set.iter().find(|(key, _)| *key == name).map(|(_, value)| value.to_string());
-            Task::of_environment(Phase::Mesh, count, variable).map(|task| task.to_string()).map_err(|e| e.exit_code())
+            Task::of_environment(Phase::Mesh, count, variable).map(|task| task.to_string()).map_err(|e| e.kind())
         };
         let slurm = [("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_ARRAY_TASK_MAX", "8"), ("SLURM_ARRAY_TASK_COUNT", "8")];
         assert_eq!(task(None, &slurm), Ok("3/8".into()));
         assert_eq!(task(Some(20), &slurm), Ok("3/20".into()));
         // An array of only some tasks does not tell how many there are.
         let some = [slurm[0], slurm[1], ("SLURM_ARRAY_TASK_COUNT", "2")];
-        assert_eq!(task(None, &some), Err(2));
+        assert_eq!(task(None, &some), Err(ErrorKind::Usage));
         assert_eq!(task(Some(8), &some), Ok("3/8".into()));
-        assert_eq!(task(Some(2), &some), Err(2));
-        assert_eq!(task(Some(8), &[("SLURM_ARRAY_TASK_ID", "0")]), Err(2));
+        assert_eq!(task(Some(2), &some), Err(ErrorKind::Usage));
+        assert_eq!(task(Some(8), &[("SLURM_ARRAY_TASK_ID", "0")]), Err(ErrorKind::Usage));
         for name in ["JOB_COMPLETION_INDEX", "AWS_BATCH_JOB_ARRAY_INDEX"] {
             assert_eq!(task(Some(8), &[(name, "0")]), Ok("1/8".into()));
             assert_eq!(task(Some(8), &[(name, "7")]), Ok("8/8".into()));
-            assert_eq!(task(Some(8), &[(name, "8")]), Err(2));
-            assert_eq!(task(Some(8), &[(name, "x")]), Err(2));
-            assert_eq!(task(None, &[(name, "0")]), Err(2));
+            assert_eq!(task(Some(8), &[(name, "8")]), Err(ErrorKind::Usage));
+            assert_eq!(task(Some(8), &[(name, "x")]), Err(ErrorKind::Usage));
+            assert_eq!(task(None, &[(name, "0")]), Err(ErrorKind::Usage));
         }
-        assert_eq!(task(Some(8), &[]), Err(2));
+        assert_eq!(task(Some(8), &[]), Err(ErrorKind::Usage));
         let only = |count: Option<u32>| Task::of_environment(Phase::Join, count, |_| None).unwrap().to_string();
         assert_eq!((only(None), only(Some(8))), ("1/1".into(), "1/8".into()));
     }

@@ -1,18 +1,32 @@
-//! Errors: a sentence that a user can act on, and an exit code for each.
+//! The errors that every crate can meet. Crates with errors of their own wrap these. An error is a sentence that a user can act on; its
+//! kind tells a program what to do.
 
 use crate::terminal::name;
 use std::path::{Path, PathBuf};
 
-/// The result of everything in this crate that can fail.
+/// The result of everything that fails only with these errors.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// What kind of failure an error is: what a script, a scheduler or a user can do about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// The same may succeed if it is repeated.
+    Retry,
+    /// The command line or the configuration is wrong.
+    Usage,
+    /// An input cannot be used.
+    Input,
+    /// A guarantee of the program does not hold.
+    Internal,
+}
 
 /// What errors call the standard output.
 pub const STANDARD_OUTPUT: &str = "standard output";
 
-/// Every failure of this crate. `Display` says which file, which record or line, what is wrong and what to do.
+/// What every crate can meet. `Display` says which file, which record or line, what is wrong and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The operating system refused an operation: it may succeed later (exit code 1), or the path itself is wrong (exit code 2).
+    /// The operating system refused an operation: it may succeed later, or the path itself is wrong.
     #[error("cannot {action} {}: {source}{}", name(path), remedy(path, source))]
     Io {
         /// The operation as a verb: "read", "create", "write".
@@ -22,84 +36,16 @@ pub enum Error {
         /// The error of the operating system.
         source: std::io::Error,
     },
-    /// Another process works in the job directory (exit code 1).
-    #[error("{} is working in {}: wait for it, or choose another [output] directory", working(holder), name(directory))]
-    InUse {
-        /// The job directory.
-        directory: PathBuf,
-        /// Which process it is, on which machine; empty if it has not written it yet.
-        holder: String,
-    },
-    /// A job has not put all its results in place (exit code 1).
-    #[error(
-        "{}: a job is under way here, or was stopped, so its results are not all in place: run the job again, or wait for it",
-        name(directory)
-    )]
-    Unfinished {
-        /// The output directory.
-        directory: PathBuf,
-    },
-    /// A task came before what it needs was done (exit code 1).
-    #[error("{0}")]
-    TooEarly(String),
-    /// Tasks of a phase failed, and have said why (the worst of their exit codes).
-    #[error(
-        "the phase {phase} is not complete: of {count} tasks these failed: {}; {}",
-        list(failed),
-        if *code == 1 { "run the same command again to go on" } else { "they have said why" }
-    )]
-    Tasks {
-        /// The phase.
-        phase: &'static str,
-        /// The numbers of the tasks.
-        failed: Vec<u32>,
-        /// How many tasks the phase has.
-        count: u32,
-        /// The worst exit code.
-        code: u8,
-    },
-    /// The job does not fit the memory it was given (exit code 1).
+    /// The job does not fit the memory it was given.
     #[error("not enough memory: {0}")]
     Memory(String),
-    /// The scheduler of a cluster refused something, or has something to do first (exit code 1).
-    #[error("{0}")]
-    Engine(String),
-    /// The port to listen on is taken (exit code 1).
-    #[error("{0}")]
-    Port(String),
-    /// The process was asked to stop (exit code 1).
+    /// The process was asked to stop.
     #[error("interrupted")]
     Interrupted,
-    /// A job stopped, and its finished steps are kept (the exit code of `why`).
-    #[error("{why}\nfinished steps are kept in {} ({steps}): {}, without --restart, to go on", name(job), again(why))]
-    Resumable {
-        /// Why the job stopped.
-        why: Box<Error>,
-        /// The number of finished steps.
-        steps: u64,
-        /// The job directory.
-        job: PathBuf,
-    },
-    /// The command line or the configuration is wrong (exit code 2).
+    /// The command line or the configuration is wrong.
     #[error("{0}")]
     Config(String),
-    /// What was read contradicts the headers, so a job of several parts starts again as one part (exit code 4: no user sees it).
-    #[error("what was read contradicts the header of a file")]
-    NeedsOnePart,
-    /// What an interrupted run left is damaged, so the job starts over (exit code 4: no user sees it).
-    #[error("what the interrupted run left is damaged")]
-    DamagedSteps,
-    /// The mesh has a triangle too long for single precision at the resolution of the job (exit code 2).
-    #[error(
-        "{what}: set a coarser [input] resolution or narrower bounds, or leave out the classes that are not terrain"
-    )]
-    TooFine {
-        /// Whether the resolution of z is too fine, not that of x and y.
-        vertical: bool,
-        /// How long the triangle is, and how long it may be.
-        what: String,
-    },
-    /// An input file cannot be used (exit code 3).
+    /// An input file cannot be used.
     #[error("{}: {what}", name(path))]
     Input {
         /// The input file.
@@ -107,27 +53,9 @@ pub enum Error {
         /// Which record or line, what is wrong with it and what to do.
         what: String,
     },
-    /// The inputs are readable, but they hold nothing to triangulate (exit code 3).
-    #[error("{0}")]
-    NoTerrain(String),
-    /// A guarantee of this program does not hold (exit code 4).
+    /// A guarantee of this program does not hold.
     #[error("internal check failed: {0}; please report this with the configuration and the input")]
     Broken(String),
-}
-
-fn working(holder: &str) -> &str {
-    if holder.is_empty() { "another process" } else { holder }
-}
-
-fn list(numbers: &[u32]) -> String {
-    numbers.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
-}
-
-fn again(why: &Error) -> &'static str {
-    match why {
-        Error::Config(_) => "correct the configuration and run the same command again",
-        _ => "run the same command again",
-    }
 }
 
 /// Returns what a user can do about an error of the operating system, or nothing.
@@ -179,29 +107,19 @@ fn is_shortage_of_files(_: &std::io::Error) -> bool {
 }
 
 impl Error {
-    /// Returns the exit code of the process: 1 may be retried, 2 command line or configuration, 3 bad input, 4 a guarantee does not
-    /// hold.
-    pub fn exit_code(&self) -> u8 {
+    /// Returns what kind of failure it is.
+    pub fn kind(&self) -> ErrorKind {
         match self {
-            Error::Io { source, .. } if is_about_the_path(source) => 2,
-            Error::Io { .. }
-            | Error::InUse { .. }
-            | Error::Unfinished { .. }
-            | Error::TooEarly(_)
-            | Error::Memory(_)
-            | Error::Engine(_)
-            | Error::Port(_)
-            | Error::Interrupted => 1,
-            Error::Resumable { why, .. } => why.exit_code(),
-            Error::Tasks { code, .. } => *code,
-            Error::Config(_) | Error::TooFine { .. } => 2,
-            Error::Input { .. } | Error::NoTerrain(_) => 3,
-            Error::Broken(_) | Error::NeedsOnePart | Error::DamagedSteps => 4,
+            Error::Io { source, .. } if is_about_the_path(source) => ErrorKind::Usage,
+            Error::Io { .. } | Error::Memory(_) | Error::Interrupted => ErrorKind::Retry,
+            Error::Config(_) => ErrorKind::Usage,
+            Error::Input { .. } => ErrorKind::Input,
+            Error::Broken(_) => ErrorKind::Internal,
         }
     }
 
-    /// Returns a function for `map_err`: it makes an [`Error::Io`] about doing `action` ("read", "write" ...) to `path`. An error of this
-    /// crate that came through a trait of the standard library stays what it is.
+    /// Returns a function for `map_err`: it makes an [`Error::Io`] about doing `action` ("read", "write" ...) to `path`. An error of
+    /// this type that came through a trait of the standard library stays what it is.
     pub fn io(action: &'static str, path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Error {
         let path = path.as_ref().to_path_buf();
         move |source| source.downcast().unwrap_or_else(|source| Error::Io { action, path, source })
@@ -233,6 +151,6 @@ mod tests {
     fn a_shortage_of_open_files_names_its_cure() {
         let shortage = std::io::Error::from_raw_os_error(rustix::io::Errno::MFILE.raw_os_error());
         let error = Error::io("read", "a.laz")(shortage);
-        assert!(error.exit_code() == 1 && error.to_string().contains("ulimit -n"), "{error}");
+        assert!(error.kind() == ErrorKind::Retry && error.to_string().contains("ulimit -n"), "{error}");
     }
 }

@@ -1,6 +1,6 @@
 //! Signals: long work checks between its pieces whether the process should stop, so that finished work is kept.
 
-use crate::{Error, Result, fault};
+use crate::{Error, ErrorKind, Result, fault};
 use std::panic::Location;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
@@ -9,13 +9,14 @@ use std::sync::{Arc, LazyLock};
 static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// Makes Ctrl-C, SIGTERM and the hangup of the terminal (unless `nohup` says to ignore it) set what [`check`] sees; a second signal
-/// ends the process at once. Also turns the signal for a file that grows beyond the limit of the shell into an error of the write.
+/// ends the process at once, with the exit code that `code_of` gives. Also turns the signal for a file that grows beyond the limit of the
+/// shell into an error of the write.
 ///
 /// # Errors
 /// [`Error::Io`] if the system refuses.
-pub fn listen() -> Result<()> {
+pub fn listen(code_of: impl Fn(ErrorKind) -> u8) -> Result<()> {
     use signal_hook::consts::{SIGINT, SIGTERM};
-    let exit_code = i32::from(Error::Interrupted.exit_code());
+    let exit_code = i32::from(code_of(Error::Interrupted.kind()));
     let hangup = hangup().filter(|signal| !is_ignored(*signal));
     for signal in [SIGINT, SIGTERM].into_iter().chain(hangup) {
         // In this order. Otherwise the first signal would find the flag set and end the process.

@@ -16,7 +16,7 @@ pub mod terminal;
 pub mod threads;
 mod warnings;
 
-pub use error::{Error, Result};
+pub use error::{Error, ErrorKind, Result};
 pub use warnings::Warnings;
 
 /// Writes a message to standard error, as a terminal can show it. A closed or full standard error must not end the job, so failures are ignored.

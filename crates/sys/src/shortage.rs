@@ -1,7 +1,7 @@
 //! What happens when the system gives no memory where nothing can be done about it: the process ends with the exit code for that,
 //! and a job goes on from its journal when it runs again.
 
-use crate::{Error, Result, address_space, say};
+use crate::{Error, ErrorKind, Result, address_space, say};
 use std::panic::PanicHookInfo;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,18 +15,20 @@ const TIGHT: u64 = 128 << 20;
 const SHORTAGES: [&str; 5] =
     ["os error 11)", "os error 12)", "code: 11,", "code: 12,", "failed to allocate an alternative stack"];
 
-/// Makes a lack of memory end the process with its exit code from now on, and checks that there is some.
+/// Makes a lack of memory end the process from now on, with the exit code that `code_of` gives, and checks that there is some.
 ///
 /// # Errors
 /// [`Error::Memory`] if there is hardly any, [`Error::Io`] if the system refuses.
-pub fn listen() -> Result<()> {
+pub fn listen(code_of: impl Fn(ErrorKind) -> u8) -> Result<()> {
     let panicked = Arc::new(AtomicBool::new(false));
-    end_aborts(&panicked)?;
+    let [shortage_code, internal_code] =
+        [Error::Memory(String::new()), Error::Broken(String::new())].map(|error| i32::from(code_of(error.kind())));
+    end_aborts(&panicked, shortage_code, internal_code)?;
     let shown = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| match shortage(info) {
         Some(what) => {
             say(&format!("error: not enough memory: {what}"));
-            std::process::exit(exit_code());
+            std::process::exit(shortage_code);
         }
         None => {
             panicked.store(true, Ordering::Relaxed);
@@ -44,24 +46,19 @@ pub fn listen() -> Result<()> {
 /// Rust says "memory allocation of ... bytes failed" and aborts: there is no stable way to return an error instead. A process that has
 /// `panicked` aborts if it panics again meanwhile: that is an internal fault.
 #[cfg(unix)]
-fn end_aborts(panicked: &Arc<AtomicBool>) -> Result<()> {
+fn end_aborts(panicked: &Arc<AtomicBool>, shortage_code: i32, internal_code: i32) -> Result<()> {
     use signal_hook::consts::SIGABRT;
     use signal_hook::flag::register_conditional_shutdown;
-    let internal = i32::from(Error::Broken(String::new()).exit_code());
     // The first whose condition holds ends the process.
-    register_conditional_shutdown(SIGABRT, internal, panicked.clone())
-        .and_then(|_| register_conditional_shutdown(SIGABRT, exit_code(), Arc::new(AtomicBool::new(true))))
+    register_conditional_shutdown(SIGABRT, internal_code, panicked.clone())
+        .and_then(|_| register_conditional_shutdown(SIGABRT, shortage_code, Arc::new(AtomicBool::new(true))))
         .map(drop)
         .map_err(Error::io("listen to the signals of", "the system"))
 }
 
 #[cfg(not(unix))]
-fn end_aborts(_: &Arc<AtomicBool>) -> Result<()> {
+fn end_aborts(_: &Arc<AtomicBool>, _: i32, _: i32) -> Result<()> {
     Ok(())
-}
-
-fn exit_code() -> i32 {
-    i32::from(Error::Memory(String::new()).exit_code())
 }
 
 /// Returns what a panic says if it stands for a lack of memory or threads.

@@ -37,7 +37,10 @@ const RESERVE: u64 = 4 << 20;
 ///
 /// # Errors
 /// [`Error::Memory`] if the threads cannot be started, and the errors of `work`.
-pub fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+pub fn on_threads<T: Send, E: From<Error> + Send>(
+    threads: usize,
+    work: impl FnOnce() -> std::result::Result<T, E> + Send,
+) -> std::result::Result<T, E> {
     // A thread that starts without room for its signal stack would end the process.
     let bytes = RESERVE + BYTES_PER_THREAD * threads as u64;
     address_space::require(bytes, address_space::left(), || format!("starting {threads} threads"))?;
@@ -53,14 +56,20 @@ pub fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Se
 ///
 /// # Errors
 /// Those of `work`, then those of `waiting`.
-pub fn run_concurrently<T>(waiting: impl Fn() -> Result<()> + Sync, work: impl FnOnce() -> Result<T>) -> Result<T> {
+pub fn run_concurrently<T, E: From<Error>>(
+    waiting: impl Fn() -> Result<()> + Sync,
+    work: impl FnOnce() -> std::result::Result<T, E>,
+) -> std::result::Result<T, E> {
     std::thread::scope(|scope| match std::thread::Builder::new().spawn_scoped(scope, &waiting) {
         Ok(thread) => {
             let outcome = work();
             let waited = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            outcome.and_then(|outcome| waited.map(|()| outcome))
+            outcome.and_then(|outcome| Ok(waited.map(|()| outcome)?))
         }
-        Err(_) => waiting().and_then(|()| work()),
+        Err(_) => {
+            waiting()?;
+            work()
+        }
     })
 }
 

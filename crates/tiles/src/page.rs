@@ -80,7 +80,7 @@ mod tests {
             }
             Err(error) => {
                 assert!(!is_built_in());
-                assert_eq!(error.exit_code(), 2);
+                assert_eq!(error.kind(), sys::ErrorKind::Usage);
                 assert!(error.to_string().contains("npm run build --prefix viewer"), "{error}");
             }
         }

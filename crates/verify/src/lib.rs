@@ -64,6 +64,7 @@ mod border;
 mod border_matching;
 mod breaklines;
 mod digest;
+mod error;
 mod exact;
 mod failures;
 mod file_search;
@@ -86,6 +87,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 pub use digest::{Digest, digest_of};
+pub use error::{Error, Result};
 pub use source_grid::{SourceGrid, SourceGridError};
 pub use verdict::{Conclusion, Verdict};
 
@@ -99,15 +101,15 @@ use crate::report::ReadReport;
 use crate::tile_files::TileFiles;
 use crate::verdict::CheckedMesh;
 use crate::written_files::WrittenFiles;
-use sys::{Error, Result, address_space, disk};
+use sys::{address_space, disk};
 use tiles::file_names::OutputFiles;
 use tiles::gltf::read::{TileFile, read_tile};
 
 /// Checks what is in the output `directory` of a job within about `memory` bytes. The verdict lists what does not hold.
 ///
 /// # Errors
-/// [`Error::Config`] if it is no output of a job, [`Error::Unfinished`] if its results are not all in place, [`Error::Memory`] if one
-/// tile alone needs more memory, [`Error::Io`] if the system cannot read a tile.
+/// [`sys::Error::Config`] if it is no output of a job, [`Error::Unfinished`] if its results are not all in place, [`sys::Error::Memory`] if
+/// one tile alone needs more memory, [`sys::Error::Io`] if the system cannot read a tile.
 pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
     verify_against(directory, memory, &[])
 }
@@ -115,13 +117,13 @@ pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
 /// As [`verify`]; proves also that the vertices are the points of the files `inputs`, if there are any.
 ///
 /// # Errors
-/// As [`verify`], and [`Error::Io`] or [`Error::Input`] if an input cannot be read.
+/// As [`verify`], and [`sys::Error::Io`] or [`sys::Error::Input`] if an input cannot be read.
 pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Result<Verdict> {
     let memory = address_space::at_start().map_or(memory, |left| memory.min(left.bytes));
     refuse_unfinished(directory)?;
     let found = TileFiles::find(directory);
-    if let Err(error @ Error::Io { .. }) = found {
-        return Err(error);
+    if let Err(error @ sys::Error::Io { .. }) = found {
+        return Err(error.into());
     }
     let report = ReadReport::read(directory);
     let written = WrittenFiles::check(directory, report.facts.file_list);
@@ -129,10 +131,10 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     let files = match found {
         Ok(files) => files,
         // Where a job was finished, they were there.
-        Err(Error::Config(_)) if directory.is_dir() && (report.is_of_a_job() || written.has_list) => {
+        Err(sys::Error::Config(_)) if directory.is_dir() && (report.is_of_a_job() || written.has_list) => {
             return unusable("the tiles are gone: tiles/ is not there, or has no .glb file".into());
         }
-        Err(error @ Error::Config(_)) => return Err(error),
+        Err(error @ sys::Error::Config(_)) => return Err(error.into()),
         Err(error) => return unusable(error.to_string()),
     };
     let grid = match SourceGrid::new(&files.extras) {
@@ -168,7 +170,7 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
 /// and removes the report of the job before first.
 fn refuse_unfinished(directory: &Path) -> Result<()> {
     let output = OutputFiles::new(directory);
-    let is_there = |path: PathBuf| disk::exists(&path).map_err(Error::io("read", &path));
+    let is_there = |path: PathBuf| disk::exists(&path).map_err(sys::Error::io("read", &path));
     if is_there(output.journal())? && !is_there(output.report())? {
         return Err(Error::Unfinished { directory: directory.into() });
     }
@@ -190,14 +192,14 @@ struct Verification<'a> {
 
 impl Verification<'_> {
     /// Checks one file after the other until none is left.
-    fn check_files(&self) -> Result<Findings> {
+    fn check_files(&self) -> sys::Result<Findings> {
         let mut findings = Findings::default();
         loop {
             let number = self.next.fetch_add(1, Ordering::Relaxed);
             let Some(path) = self.files.paths.get(number) else { return Ok(findings) };
             match read_tile(path) {
                 Ok(tile) => self.check_file(number, &tile, &mut findings)?,
-                Err(error @ Error::Input { .. }) => {
+                Err(error @ sys::Error::Input { .. }) => {
                     findings.failures.note(Failure::UnusableTile, number as u32, || error.to_string());
                 }
                 Err(error) => return Err(error),
@@ -205,7 +207,7 @@ impl Verification<'_> {
         }
     }
 
-    fn check_file(&self, number: usize, tile: &TileFile, findings: &mut Findings) -> Result<()> {
+    fn check_file(&self, number: usize, tile: &TileFile, findings: &mut Findings) -> sys::Result<()> {
         if tile.extras != self.files.extras {
             let [this, first] = [number, 0].map(|number| self.files.paths[number].display());
             let example = || format!("{this} comes from another job than {first}");

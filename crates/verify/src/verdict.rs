@@ -67,17 +67,6 @@ pub enum Conclusion {
     Failed,
 }
 
-impl Conclusion {
-    /// Returns the exit code of `verify`. What is missing counts as a bad input: it was not given the whole output.
-    pub fn exit_code(self) -> u8 {
-        match self {
-            Conclusion::Proved => 0,
-            Conclusion::AsFarAsCanBeTold => 3,
-            Conclusion::Failed => 4,
-        }
-    }
-}
-
 /// The checked meshes of all tiles.
 pub(super) struct CheckedMesh<'a> {
     pub(super) files: &'a TileFiles,

@@ -4,6 +4,7 @@ use ::job::options::{JobOptions, Threads};
 use delaunay_gpu::triangulation_options::Backend;
 
 use super::{job, with_file};
+use sys::ErrorKind;
 
 /// The bytes of a configuration file, with a whole job.
 pub(crate) fn config(bytes: &[u8]) {
@@ -20,7 +21,7 @@ fn with_config(bytes: &[u8], run: fn(JobOptions)) {
     let options = match with_file(".toml", bytes, gdt_batch::config::load) {
         Ok(options) => options,
         Err(error) => {
-            assert_eq!(error.exit_code(), 2, "{error}");
+            assert_eq!(error.kind(), ErrorKind::Usage, "{error}");
             return;
         }
     };

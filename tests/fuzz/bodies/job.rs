@@ -1,11 +1,12 @@
 //! Whole jobs: whatever the input, a job ends with an error that a user can act on, or with an output that verifies.
 
+use job::Error;
 use job::options::{JobOptions, RunOptions};
 use job::preflight::check;
 use job::progress::stage::ProgressOutput;
-use sys::Error;
 
 use super::with_file;
+use sys::ErrorKind;
 
 /// Memory for verifying, in bytes.
 const MEMORY: u64 = 1 << 28;
@@ -50,6 +51,10 @@ pub(crate) fn run_and_verify(mut options: JobOptions) {
 
 /// Asserts that the error is about the inputs, the configuration or the memory limit, and short.
 fn assert_is_for_the_user(error: &Error) {
-    assert!(matches!(error.exit_code(), 2 | 3) || matches!(error, Error::Memory(_)), "{error}");
+    assert!(
+        matches!(error.kind(), ErrorKind::Usage | ErrorKind::Input)
+            || matches!(error, Error::System(sys::Error::Memory(_))),
+        "{error}"
+    );
     assert!(error.to_string().len() < 4000, "{error}");
 }

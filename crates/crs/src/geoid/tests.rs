@@ -5,6 +5,7 @@ use flate2::write::ZlibEncoder;
 use proptest::prelude::*;
 use std::io::{Cursor, Write};
 use std::path::PathBuf;
+use sys::ErrorKind;
 use tempfile::TempDir;
 use tiff::encoder::colortype::{Gray16, Gray32Float};
 use tiff::encoder::{Compression, TiffEncoder};
@@ -139,8 +140,8 @@ fn opened(name: &str, bytes: &[u8]) -> Result<Geoid, Error> {
 
 #[track_caller]
 fn refused_with(geoid: Result<Geoid, Error>, words: &[&str]) {
-    let error = geoid.err().map(|e| (e.exit_code(), e.to_string())).expect("an error");
-    assert_eq!(error.0, 2);
+    let error = geoid.err().map(|e| (e.kind(), e.to_string())).expect("an error");
+    assert_eq!(error.0, ErrorKind::Usage);
     let told = words.iter().chain(&["[output] height_offset"]).all(|word| error.1.contains(word));
     assert!(told, "no {words:?} in {}", error.1);
 }
@@ -175,7 +176,7 @@ fn either_format_gives_the_same_heights_between_nodes() {
         for [x, y] in [[10.49, 45.2], [11.51, 45.2], [11.0, 44.99], [11.0, 46.51], [-169.0, 46.0]] {
             let error = geoid.at(x, y).unwrap_err();
             let said = error.to_string();
-            assert_eq!(error.exit_code(), 2);
+            assert_eq!(error.kind(), ErrorKind::Usage);
             assert!(said.contains(name) && said.contains("10.500 to 11.500") && said.contains("egm96"), "{said}");
         }
     }
@@ -268,7 +269,7 @@ fn a_damaged_part_of_a_geotiff_is_an_error_where_it_is_needed() {
     let (_folder, path) = written("grid.tif", &bytes);
     let geoid = Geoid::open(Some(&HeightOffset::Grid(path))).unwrap();
     let error = geoid.at(11.0, 46.2).unwrap_err();
-    assert!(error.exit_code() == 2 && error.to_string().contains("part 0 of the grid"), "{error}");
+    assert!(error.kind() == ErrorKind::Usage && error.to_string().contains("part 0 of the grid"), "{error}");
 }
 
 /// Heights that NASA and NIMA give with the model (OUTPUT.DAT of its program F477), in metres.

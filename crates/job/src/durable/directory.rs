@@ -179,7 +179,7 @@ impl JobDirectory {
     ///
     /// # Errors
     /// As [`Lock::take`].
-    pub fn lock(&self) -> Result<Lock> {
+    pub fn lock(&self) -> crate::Result<Lock> {
         Lock::take(&self.job)
     }
 
@@ -187,7 +187,7 @@ impl JobDirectory {
     ///
     /// # Errors
     /// As [`Lock::take_within`].
-    pub fn lock_within(&self) -> Result<Lock> {
+    pub fn lock_within(&self) -> crate::Result<Lock> {
         Lock::take_within(&self.job)
     }
 
@@ -195,7 +195,7 @@ impl JobDirectory {
     ///
     /// # Errors
     /// As [`Lock::share`].
-    pub fn share_lock(&self) -> Result<Lock> {
+    pub fn share_lock(&self) -> crate::Result<Lock> {
         Lock::share(&self.job)
     }
 
@@ -203,7 +203,7 @@ impl JobDirectory {
     ///
     /// # Errors
     /// As [`JobDirectory::lock`] and [`JobDirectory::clear`].
-    pub fn create(&self) -> Result<Lock> {
+    pub fn create(&self) -> crate::Result<Lock> {
         let lock = self.lock()?;
         remove_file(&self.journal())?;
         self.clear(&HashSet::new())?;
@@ -281,6 +281,7 @@ mod tests {
     use super::*;
     use crate::durable::cleaning::remove_job;
     use std::fs;
+    use sys::ErrorKind;
     use tiles::checksums::{Checksum, list_text};
 
     fn names(names: &[&str]) -> HashSet<PathBuf> {
@@ -317,7 +318,7 @@ mod tests {
         drop(directory.create().unwrap());
         fs::rename(output.path().join("job/lock"), output.path().join("job/theirs")).unwrap();
         let error = directory.create().unwrap_err();
-        assert_eq!(error.exit_code(), 2, "{error}");
+        assert_eq!(error.kind(), ErrorKind::Usage, "{error}");
     }
 
     /// Wherever it was cut off, replacing goes on to the same end, and as long as it is not there, no report tells of results.
@@ -400,7 +401,7 @@ mod tests {
         fs::write(directory.results().page(), "theirs").unwrap();
         let names = names(&["index.html", "report.json"]);
         let error = directory.replace_results(&names).unwrap_err();
-        assert_eq!(error.exit_code(), 2);
+        assert_eq!(error.kind(), ErrorKind::Usage);
         assert!(error.to_string().contains("move it away"), "{error}");
         assert_eq!(fs::read(directory.results().page()).unwrap(), b"theirs");
         fs::remove_file(directory.results().page()).unwrap();
@@ -424,7 +425,7 @@ mod tests {
         write_list(directory.output(), &["tiles/000000.glb", "tiles/000001.glb"]);
         let names = names(&["tiles/000000.glb", "tiles/000001.glb", "XXH128SUMS", "report.json"]);
         let error = directory.replace_results(&names).unwrap_err();
-        assert_eq!(error.exit_code(), 2);
+        assert_eq!(error.kind(), ErrorKind::Usage);
         assert!(error.to_string().contains("000000.glb came during the job, and no job wrote it"), "{error}");
         assert_eq!(fs::read(directory.results().tile(0)).unwrap(), b"theirs");
         fs::remove_file(directory.results().tile(0)).unwrap();
@@ -438,7 +439,7 @@ mod tests {
         let directory = JobDirectory::new(output.path());
         let lock = directory.create().unwrap();
         let error = directory.create().unwrap_err();
-        assert_eq!(error.exit_code(), 1);
+        assert_eq!(error.kind(), ErrorKind::Retry);
         assert!(error.to_string().contains(&std::process::id().to_string()), "{error}");
         drop(lock);
         directory.create().unwrap();

@@ -328,15 +328,20 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
     /// # Errors
     /// [`Error::Interrupted`], [`Error::Io`] on the journal, [`Error::Broken`] if the figures are those of another kind of step, and
     /// the errors of `work`.
-    pub fn step<T>(&self, step: S, work: impl FnOnce() -> Result<StepOutput<T, K>>) -> Result<T>
+    pub fn step<T, E>(
+        &self,
+        step: S,
+        work: impl FnOnce() -> std::result::Result<StepOutput<T, K>, E>,
+    ) -> std::result::Result<T, E>
     where
         T: Serialize + DeserializeOwned,
+        E: From<Error>,
     {
         if let Some(stats) = self.taken_over.get(&step) {
-            return figures(step, stats);
+            return Ok(figures(step, stats)?);
         }
         interrupt::check()?;
-        self.record(step, work()?)
+        Ok(self.record(step, work()?)?)
     }
 
     /// Records that `step` is finished and returns its figures. Its results get their names when the record is committed, which

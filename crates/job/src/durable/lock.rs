@@ -1,10 +1,11 @@
 //! The locks of a job directory: one process has it alone, or the tasks of a job share it.
 
+use crate::{Error, Result};
 use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use sys::disk;
 use sys::disk::WriteFrom;
-use sys::{Error, Result, disk};
 
 /// A held lock. The system releases it with the process, so a kill leaves nothing to clean up.
 #[derive(Debug)]
@@ -20,17 +21,18 @@ impl Lock {
     /// Creates the job directory `job` if need be and takes its lock. The lock file also marks the directory as a job's own.
     ///
     /// # Errors
-    /// [`Error::Io`] if the directory or the file cannot be made, [`Error::InUse`] if another process holds the lock,
-    /// [`Error::Config`] if the directory is not a job directory.
+    /// [`sys::Error::Io`] if the directory or the file cannot be made, [`Error::InUse`] if another process holds the lock,
+    /// [`sys::Error::Config`] if the directory is not a job directory.
     pub fn take(job: &Path) -> Result<Lock> {
         // A kill can leave an empty directory.
-        let is_new = disk::list(job).map_err(Error::io("read", job))?.is_empty();
+        let is_new = disk::list(job).map_err(sys::Error::io("read", job))?.is_empty();
         let path = lock_file(job);
-        if !is_new && !disk::exists(&path).map_err(Error::io("read", &path))? {
-            return Err(Error::Config(format!(
+        if !is_new && !disk::exists(&path).map_err(sys::Error::io("read", &path))? {
+            return Err(sys::Error::Config(format!(
                 "{} exists and is not a job directory of this program: choose another [output] directory",
                 job.display()
-            )));
+            ))
+            .into());
         }
         Lock::take_within(job)
     }
@@ -41,9 +43,9 @@ impl Lock {
     /// # Errors
     /// As [`Lock::take`].
     pub fn take_within(job: &Path) -> Result<Lock> {
-        disk::create_folder(job).map_err(Error::io("create the directory", job))?;
+        disk::create_folder(job).map_err(sys::Error::io("create the directory", job))?;
         let path = lock_file(job);
-        let file = disk::open_or_create(&path).map_err(Error::io("open", &path))?;
+        let file = disk::open_or_create(&path).map_err(sys::Error::io("open", &path))?;
         let is_real = is_held(file.try_lock(), &file, job)?;
         say_who(&file, &path, &this_process())?;
         Ok(Lock { _file: file, is_real })
@@ -52,13 +54,13 @@ impl Lock {
     /// Shares the lock of the job directory `job`, which must be there, with other tasks of the job.
     ///
     /// # Errors
-    /// [`Error::Io`] if the file cannot be opened, [`Error::InUse`] if a process has it alone.
+    /// [`sys::Error::Io`] if the file cannot be opened, [`Error::InUse`] if a process has it alone.
     pub fn share(job: &Path) -> Result<Lock> {
         let path = lock_file(job);
-        let mut file = disk::open(&path).map_err(Error::io("open", &path))?;
+        let mut file = disk::open(&path).map_err(sys::Error::io("open", &path))?;
         let is_real = is_held(file.try_lock_shared(), &file, job)?;
         // All tasks write the same, and only the first has to.
-        if holder(&mut file).map_err(Error::io("read", &path))? != TASKS {
+        if holder(&mut file).map_err(sys::Error::io("read", &path))? != TASKS {
             say_who(&file, &path, TASKS)?;
         }
         Ok(Lock { _file: file, is_real })
@@ -76,11 +78,11 @@ fn is_held(outcome: std::result::Result<(), TryLockError>, mut file: &File, job:
     match outcome {
         Ok(()) => Ok(true),
         Err(TryLockError::WouldBlock) => {
-            let holder = holder(&mut file).map_err(Error::io("read", &path))?;
+            let holder = holder(&mut file).map_err(sys::Error::io("read", &path))?;
             Err(Error::InUse { directory: job.into(), holder })
         }
         Err(TryLockError::Error(e)) if has_no_locks(&e) => Ok(false),
-        Err(TryLockError::Error(e)) => Err(Error::io("lock", &path)(e)),
+        Err(TryLockError::Error(e)) => Err(sys::Error::io("lock", &path)(e).into()),
     }
 }
 
@@ -101,11 +103,11 @@ fn has_no_locks(error: &io::Error) -> bool {
 }
 
 /// Writes down who has the lock, for the message to others.
-fn say_who(file: &File, path: &Path, who: &str) -> Result<()> {
+fn say_who(file: &File, path: &Path, who: &str) -> sys::Result<()> {
     match disk::set_length(file, 0).and_then(|()| write!(WriteFrom { file, at: 0 }, "{who}")) {
         // The lock holds all the same, and this process may be the one that makes room.
         Err(e) if matches!(e.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded) => Ok(()),
-        outcome => outcome.map_err(Error::io("write", path)),
+        outcome => outcome.map_err(sys::Error::io("write", path)),
     }
 }
 
@@ -148,7 +150,10 @@ mod tests {
         drop(alone);
         let tasks = [Lock::share(&job).unwrap(), Lock::share(&job).unwrap()];
         let refused = Lock::take(&job).unwrap_err();
-        assert!(refused.to_string().contains("task of this job") && refused.exit_code() == 1, "{refused}");
+        assert!(
+            refused.to_string().contains("task of this job") && refused.kind() == sys::ErrorKind::Retry,
+            "{refused}"
+        );
         drop(tasks);
         Lock::take(&job).unwrap();
     }

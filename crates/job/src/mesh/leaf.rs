@@ -21,7 +21,6 @@ use lattice::VertexDigest;
 use points::Point;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
-use sys::Result;
 use tiles::normals;
 use tiles::normals::NormalSum;
 
@@ -53,7 +52,7 @@ impl AddAssign for LeafStats {
 /// Triangulates the sites of `tile` and stores them with the final triangles and the frontier.
 ///
 /// # Errors
-/// [`sys::Error::Io`] on the point file or the store, [`sys::Error::TooFine`] if a triangle is too long to be written,
+/// [`sys::Error::Io`] on the point file or the store, [`crate::Error::TooFine`] if a triangle is too long to be written,
 /// [`sys::Error::Broken`] if the triangulation fails.
 pub fn triangulate_leaf(
     plan: &Plan,
@@ -62,7 +61,7 @@ pub fn triangulate_leaf(
     store: &Store,
     triangulator: &Triangulator,
     tile: TileIndex,
-) -> Result<StepOutput<LeafStats>> {
+) -> crate::Result<StepOutput<LeafStats>> {
     let (points, duplicates) = load_sites(points, &partition.blocks[tile.get()], plan.options.input.duplicates)?;
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
     let (mesh, outcome) = triangulator.triangulate(&sites)?;
@@ -91,7 +90,12 @@ pub fn triangulate_leaf(
 }
 
 /// Checks that single precision can hold all final triangles.
-fn check_precision(mesh: &HalfEdgeMesh, sites: &[Site], states: &[TriangleState], limit: PrecisionLimit) -> Result<()> {
+fn check_precision(
+    mesh: &HalfEdgeMesh,
+    sites: &[Site],
+    states: &[TriangleState],
+    limit: PrecisionLimit,
+) -> crate::Result<()> {
     if limit.holds_all(sites) {
         return Ok(());
     }

@@ -20,7 +20,7 @@ use sys::{Error, Result, interrupt};
 /// in a frontier below, and none in the frontier that goes up.
 ///
 /// # Errors
-/// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`Error::TooFine`] if a triangle is too long to be written,
+/// [`Error::Memory`] if the frontiers do not fit `memory` bytes, [`crate::Error::TooFine`] if a triangle is too long to be written,
 /// [`Error::Io`] on the store, [`Error::Broken`] if the frontiers contradict each other.
 pub fn merge_frontiers(
     plan: &Plan,
@@ -29,7 +29,7 @@ pub fn merge_frontiers(
     store: &Store,
     memory: u64,
     node: NodeIndex,
-) -> Result<StepOutput<Vec<TileIndex>>> {
+) -> crate::Result<StepOutput<Vec<TileIndex>>> {
     check_memory(below.iter().map(|&(store, child)| Frontier::count(store, child)).sum::<Result<u64>>()?, memory)?;
     let (union, flows_below) = join(below)?;
     let sites: Vec<Site> = union.iter().map(BorderVertex::plane).collect();

@@ -1,7 +1,7 @@
 //! Whether glTF can hold the triangles of the mesh: its coordinates have 24 binary digits.
 
+use crate::{Error, Result};
 use delaunay::geometry::{Bounds, Site, bounds_of};
-use sys::{Error, Result};
 use tiles::frame::Frame;
 
 /// The longest extent in x, y and in z that a triangle may have, in lattice steps.

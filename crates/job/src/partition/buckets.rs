@@ -4,6 +4,7 @@ use crate::partition::point_file::{PointBlock, PointFile, PointFiles, PointRun};
 use points::Point;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use sys::{Error, Result};
 
@@ -21,7 +22,7 @@ impl Bucket {
     /// again.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] if its blocks cannot be read or written.
+    /// [`Error::Io`] if its blocks cannot be read or written.
     pub fn remove_records(&mut self, files: &PointFiles, orders: &[Range<u64>]) -> Result<()> {
         let is_wanted = |point: &Point| {
             let order = point.order();
@@ -58,6 +59,8 @@ pub struct Buckets<'a> {
     /// Points that a buffer holds.
     capacity: usize,
     open: Vec<Mutex<OpenBucket>>,
+    /// Whether a bucket without a file got a point.
+    has_refused: AtomicBool,
 }
 
 #[derive(Default)]
@@ -79,7 +82,12 @@ impl<'a> Buckets<'a> {
         let count = files.len();
         let room = memory / count as u64 / size_of::<Point>() as u64;
         let capacity = (room / PIECE * PIECE).clamp(LEAST_BLOCK, LARGEST_BLOCK) as usize;
-        Buckets { files, capacity, open: (0..count).map(|_| Mutex::default()).collect() }
+        Buckets {
+            files,
+            capacity,
+            open: (0..count).map(|_| Mutex::default()).collect(),
+            has_refused: AtomicBool::new(false),
+        }
     }
 
     /// Returns the bytes of one buffer where memory is ample.
@@ -90,7 +98,7 @@ impl<'a> Buckets<'a> {
     /// Adds `points`, which all belong to bucket `index`.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] if a full buffer cannot be written, [`sys::Error::NeedsOnePart`] if the bucket has no file.
+    /// [`Error::Io`] if a full buffer cannot be written, [`Error::Broken`] if the bucket has no file: see [`Buckets::has_refused`].
     pub fn extend(&self, index: usize, mut points: &[Point]) -> Result<()> {
         let mut open = lock(&self.open[index]);
         while !points.is_empty() {
@@ -108,7 +116,10 @@ impl<'a> Buckets<'a> {
     }
 
     fn flush(&self, index: usize, open: &mut OpenBucket, is_last: bool) -> Result<()> {
-        let file = self.files[index].ok_or(Error::NeedsOnePart)?;
+        let file = self.files[index].ok_or_else(|| {
+            self.has_refused.store(true, Ordering::Relaxed);
+            Error::Broken("a bucket without a file gets points".into())
+        })?;
         let block = file.append(&mut open.run, &open.buffer, is_last)?;
         open.bucket.blocks.push(block);
         open.bucket.points += block.points as u64;
@@ -116,11 +127,16 @@ impl<'a> Buckets<'a> {
         Ok(())
     }
 
+    /// Tells whether a bucket without a file got a point.
+    pub fn has_refused(&self) -> bool {
+        self.has_refused.load(Ordering::Relaxed)
+    }
+
     /// Writes what is still in the buffers and returns the buckets.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] if a buffer cannot be written.
-    pub fn finish(self) -> Result<Vec<Bucket>> {
+    /// [`Error::Io`] if a buffer cannot be written, [`Error::Broken`] as for [`Buckets::extend`].
+    pub fn finish(&self) -> Result<Vec<Bucket>> {
         let finish = |(index, open): (usize, &Mutex<OpenBucket>)| {
             let mut open = lock(open);
             if !open.buffer.is_empty() {

@@ -67,7 +67,7 @@ impl ReadBlocks {
 /// Reads the inputs that `reader` is the first to need, where `malformed` records were found before. With `sync` it waits for the disk.
 ///
 /// # Errors
-/// [`Error::NeedsOnePart`] if a header is wrong or an input is bad and to be left out; [`Error::Input`] if too many records are
+/// [`crate::Error::NeedsOnePart`] if a header is wrong or an input is bad and to be left out; [`Error::Input`] if too many records are
 /// malformed; [`Error::Io`] if an input cannot be read or a point file cannot be written.
 pub fn read_inputs(
     plan: &Plan,
@@ -77,19 +77,24 @@ pub fn read_inputs(
     malformed: u64,
     sync: bool,
     stage: &Stage,
-) -> Result<(ReadInputs, ReadBlocks)> {
+) -> crate::Result<(ReadInputs, ReadBlocks)> {
     let inputs = parts.new_inputs(reader);
     let files = parts.all().map(|part| create(parts, directory, reader, part)).collect::<Result<Vec<_>>>()?;
     let file_of = |bucket: usize| files[parts.part_of(bucket).get()].as_ref();
     let buckets = Buckets::on((0..parts.grid.buckets()).map(file_of).collect(), read_buffer_memory(&plan.options));
-    let by_input = decode(plan, inputs.iter().copied(), malformed, &parts.grid, &buckets, stage)?;
-    let buckets = buckets.finish()?;
+    let by_input = decode(plan, inputs.iter().copied(), malformed, &parts.grid, &buckets, stage);
+    let filled = by_input.and_then(|by_input| Ok((by_input, buckets.finish()?)));
+    let (by_input, buckets) = filled.map_err(|error| match error {
+        // A point lies in a part that the header does not reach.
+        Error::Broken(_) if buckets.has_refused() => crate::Error::NeedsOnePart,
+        error => error.into(),
+    })?;
     let bad = by_input.0.iter().find(|(_, summary)| summary.counts.malformed > 0);
     let malformed = bad.map(|(input, summary)| (*input, summary.counts.clone()));
     let JudgedInputs { summary, skipped, .. } = judge(plan, by_input)?;
     let broken = |bounds| plan.claims.is_some_and(|claims| claims.are_broken_by(bounds, summary.counts.max_rgb));
     if !skipped.is_empty() || summary.bounds.is_some_and(broken) {
-        return Err(Error::NeedsOnePart);
+        return Err(crate::Error::NeedsOnePart);
     }
     if sync {
         files.iter().flatten().try_for_each(PointFile::sync)?;

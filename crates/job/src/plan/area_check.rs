@@ -12,7 +12,7 @@ use points::Source;
 use points::options::{InputOptions, OutsideCrsArea};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
-use sys::{Error, Result, Warnings};
+use sys::Warnings;
 
 /// Surveys and zones reach some hundred kilometres beyond the area of use. Farther out, in degrees of arc, there is a warning.
 const DOUBTFUL: f64 = 3.0;
@@ -60,13 +60,13 @@ pub(crate) struct CommonPlace<'a> {
 /// Checks that the points of each source lie in the area of use of the system that they are in, and of that which they are transformed into.
 ///
 /// # Errors
-/// [`Error::NoTerrain`] names the first source that lies hopelessly far outside.
+/// [`crate::Error::NoTerrain`] names the first source that lies hopelessly far outside.
 pub(crate) fn check_places(
     sources: &[Source],
     common: &CommonPlace,
     options: &InputOptions,
     warnings: &mut Warnings,
-) -> Result<()> {
+) -> crate::Result<()> {
     let places: Vec<(&Source, Vec<[f64; 2]>)> = sources
         .iter()
         .zip(&common.extent.boxes)
@@ -170,13 +170,13 @@ impl Others {
 
 /// Fails if a source lies hopelessly far outside. It is no bad file that a job may leave out: what the sample of all files has of one depends
 /// on the others, and so would the mesh.
-fn refuse_hopeless(outside: &[(&Source, Outside)], is_assumed: impl Fn(&Source) -> bool) -> Result<()> {
+fn refuse_hopeless(outside: &[(&Source, Outside)], is_assumed: impl Fn(&Source) -> bool) -> crate::Result<()> {
     let Some((source, first)) = outside.iter().find(|(_, found)| found.is_hopeless()) else { return Ok(()) };
     let what = format!(
         "{}; if the CRS and the coordinates are right, set [input] outside_crs_area = \"warn\"",
         first.sentence(source, is_assumed(source))
     );
-    Err(Error::NoTerrain(format!("{}: {what}", source.path.display())))
+    Err(crate::Error::NoTerrain(format!("{}: {what}", source.path.display())))
 }
 
 /// A system that the points of a source are in.

@@ -173,7 +173,7 @@ const FINE_ENOUGH: f64 = 0.0099;
 
 /// Returns the step in x and y: the one that the user sets, or else the finest of the inputs with which a triangle across the whole
 /// extent can be written. A step of a centimetre or more is not coarsened for that reason; there the mesh itself decides
-/// ([`Error::TooFine`]).
+/// ([`crate::Error::TooFine`]).
 fn horizontal_step(sources: &[Source], extent: &Extent, wish: &LatticeRequest) -> Result<ChosenStep> {
     let metres = wish.metres[0];
     let size = extent.size(0).max(extent.size(1));

@@ -43,12 +43,12 @@ const MAX_RECORDS: u64 = 1 << 40;
 /// More warnings than this, one for each of thousands of files, would hide the others.
 const MAX_WARNINGS: usize = 50;
 
-/// Makes the plan of the job with these `options`. `coarsening` is zero unless an earlier attempt failed with [`Error::TooFine`].
+/// Makes the plan of the job with these `options`. `coarsening` is zero unless an earlier attempt failed with [`crate::Error::TooFine`].
 ///
 /// # Errors
 /// [`Error::Config`] if there are no inputs or they do not fit together; [`Error::Input`] if one is bad and must not be left
-/// out; [`Error::NoTerrain`] if none is left; [`Error::Io`] if one cannot be read.
-pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> Result<Plan> {
+/// out; [`crate::Error::NoTerrain`] if none is left; [`Error::Io`] if one cannot be read.
+pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> crate::Result<Plan> {
     set_network_memory(network_memory(options));
     let (sources, skipped) = open_all(&options.input, &row_choice(options))?;
     plan_sources(sources, skipped, options, coarsening)
@@ -59,7 +59,7 @@ pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> Result<
 ///
 /// # Errors
 /// As [`make_plan`].
-pub fn replan_without(plan: Plan, bad: &[SkippedInput]) -> Result<Plan> {
+pub fn replan_without(plan: Plan, bad: &[SkippedInput]) -> crate::Result<Plan> {
     let is_bad = |source: &Source| bad.iter().any(|bad| bad.file == source.path);
     let sources = plan.inputs.into_iter().map(|input| input.source).filter(|source| !is_bad(source));
     let is_new = |bad: &&SkippedInput| !plan.skipped.contains(bad);
@@ -75,7 +75,7 @@ pub fn replan_without(plan: Plan, bad: &[SkippedInput]) -> Result<Plan> {
 ///
 /// # Errors
 /// As [`make_plan`], if there are too many of them.
-pub(crate) fn are_there_far_points(options: &JobOptions, coarsening: LatticeCoarsening) -> Result<bool> {
+pub(crate) fn are_there_far_points(options: &JobOptions, coarsening: LatticeCoarsening) -> crate::Result<bool> {
     let left_out = |plan: &Plan| {
         let points = plan.inputs.iter().map(|input| input.source.outliers()).sum::<u64>();
         (points, plan.skipped.len())
@@ -96,10 +96,10 @@ fn plan_sources(
     mut skipped: Vec<SkippedInput>,
     options: &JobOptions,
     coarsening: LatticeCoarsening,
-) -> Result<Plan> {
+) -> crate::Result<Plan> {
     loop {
         if let (true, Some(first)) = (sources.is_empty(), skipped.first()) {
-            return Err(Error::NoTerrain(format!(
+            return Err(crate::Error::NoTerrain(format!(
                 "no input is left: all {} are bad and left out, the first of them {}: {}",
                 skipped.len(),
                 first.file.display(),
@@ -107,7 +107,7 @@ fn plan_sources(
             )));
         }
         match try_plan(&mut sources, options, coarsening) {
-            Err(Error::Input { path, what })
+            Err(crate::Error::System(Error::Input { path, what }))
                 if options.input.on_bad_file == OnBadFile::Skip && sources.iter().any(|s| s.path == path) =>
             {
                 sources.retain(|source| source.path != path);
@@ -128,13 +128,13 @@ fn try_plan(
     sources: &mut [Source],
     options: &JobOptions,
     coarsening: LatticeCoarsening,
-) -> Result<(Plan, Vec<(PointRules, Bounds<2>)>)> {
+) -> crate::Result<(Plan, Vec<(PointRules, Bounds<2>)>)> {
     let mut warnings = Warnings::default();
     sources.iter().for_each(|source| warnings.extend_from_file(&source.path, &source.warnings));
     warnings.shorten(MAX_WARNINGS);
     let records = sources.iter().map(|s| s.records).sum();
     if records >= MAX_RECORDS {
-        return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")));
+        return Err(Error::Config(format!("{records} records are more than one job can hold (2^40)")).into());
     }
     check_missing_records(sources, &options.input)?;
     refuse_other_unit(sources, &options.input)?;

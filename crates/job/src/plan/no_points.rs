@@ -7,15 +7,18 @@ use crate::plan::job_plan::decoded_records;
 use crate::plan::text_inputs::count;
 use points::surface_warnings::no_ground;
 use points::{FileFormat, PointCounts, Source};
-use sys::{Error, Result};
+use sys::Result;
 
 /// A rectangle [xmin, ymin, xmax, ymax] in source units.
 type Rectangle = [f64; 4];
 
 /// Returns the error for a job of which no point is left.
-pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
+pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> crate::Error {
     if plan.records == 0 {
-        return Error::NoTerrain(format!("{}no point is left to triangulate, because none is there", first_file(plan)));
+        return crate::Error::NoTerrain(format!(
+            "{}no point is left to triangulate, because none is there",
+            first_file(plan)
+        ));
     }
     let remedy = match plan.options.input.bounds.zip(box_of_inputs(plan)) {
         Some((bounds, inputs)) if counts.out_of_bounds > 0 && counts.classes.is_empty() => {
@@ -47,7 +50,7 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
         0 => String::new(),
         dropped => format!(", {dropped} at breaklines or in lakes"),
     };
-    Error::NoTerrain(format!(
+    crate::Error::NoTerrain(format!(
         "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}{nodata}, {} out of bounds{at_breaklines}; \
          {remedy}",
         counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
@@ -55,8 +58,8 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> Error {
 }
 
 /// Returns the error for a job whose points make no triangle.
-pub fn no_triangle(plan: &Plan) -> Error {
-    Error::NoTerrain(format!(
+pub fn no_triangle(plan: &Plan) -> crate::Error {
+    crate::Error::NoTerrain(format!(
         "{}the points make no triangle in steps of {}: a triangle takes three different places in x and y that are not on one line",
         first_file(plan),
         plan.lattice.resolution
@@ -93,7 +96,7 @@ const MOST_RECORDS: u64 = 1 << 24;
 ///
 /// # Errors
 /// Those of reading.
-pub(crate) fn nothing_will_be_left(plan: &Plan) -> Result<Option<Error>> {
+pub(crate) fn nothing_will_be_left(plan: &Plan) -> Result<Option<crate::Error>> {
     if plan.sample.kept > 0 {
         return Ok(None);
     }

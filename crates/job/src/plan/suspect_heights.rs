@@ -9,7 +9,6 @@ use lattice::Lattice;
 use points::{
     Axis, Extremes, FileFormat, Source, SuspectHeight, is_nodata_beside, is_number_in_steps, shown_height, who_has,
 };
-use sys::{Error, Result};
 
 /// What is doubtful about the heights of a file.
 struct Doubt {
@@ -22,15 +21,15 @@ struct Doubt {
 /// doubtful. Where a sample of the points of a file looks like it, all of them are read to decide. A unit of heights is so many `metres`.
 ///
 /// # Errors
-/// [`Error::NoTerrain`] names the first such file, [`Error::Io`] one that cannot be read. It is no bad file that a job may leave out: what the
-/// sample of all files has of one depends on the others, and so would the mesh.
+/// [`crate::Error::NoTerrain`] names the first such file, [`sys::Error::Io`] one that cannot be read. It is no bad file that a job may
+/// leave out: what the sample of all files has of one depends on the others, and so would the mesh.
 pub(crate) fn check_doubtful_heights(
     sources: &[Source],
     sample: &HeightSample,
     lattice: &Lattice,
     options: &JobOptions,
     metres: f64,
-) -> Result<Vec<String>> {
+) -> crate::Result<Vec<String>> {
     let mut warnings = Vec::new();
     // Of a text with outliers the heights show nothing but these.
     let is_told = |source: &&Source| source.format != FileFormat::Text || source.outliers() == 0;
@@ -50,7 +49,7 @@ pub(crate) fn check_doubtful_heights(
         let Some(Doubt { what, stops }) = doubt else { continue };
         let what = format!("{}: {what}", source.path.display());
         if stops {
-            return Err(Error::NoTerrain(what));
+            return Err(crate::Error::NoTerrain(what));
         }
         warnings.push(what);
     }

@@ -83,8 +83,8 @@ fn is_exchanged(source: &Source) -> bool {
 /// Fails if the user asks for classes, and a text has none: all of its points would be left out.
 ///
 /// # Errors
-/// [`Error::Config`] names the first such file, and [`Error::NoTerrain`] if it is the ground that the user asks for.
-pub(crate) fn refuse_missing_classes(sources: &[Source], options: &InputOptions) -> Result<()> {
+/// [`Error::Config`] names the first such file, and [`crate::Error::NoTerrain`] if it is the ground that the user asks for.
+pub(crate) fn refuse_missing_classes(sources: &[Source], options: &InputOptions) -> crate::Result<()> {
     // A point without a class counts as one of class 0.
     if !options.chooses_classes() || options.kept_classes()[0] {
         return Ok(());
@@ -93,14 +93,15 @@ pub(crate) fn refuse_missing_classes(sources: &[Source], options: &InputOptions)
     match (sources.iter().find(lacks_classes), &options.classes) {
         // As for a LAS file without ground.
         (Some(source), _) if options.surface == Surface::Ground => {
-            Err(Error::NoTerrain(format!("{}: {}", source.path.display(), no_column_of_classes())))
+            Err(crate::Error::NoTerrain(format!("{}: {}", source.path.display(), no_column_of_classes())))
         }
         (Some(source), classes) => Err(Error::Config(format!(
             "[input] classes = {:?}, but {} has no column of classes, so that none of its points would be left: let `classes` have 0 in \
              it to keep points without a class, name the column with `columns` under [input.csv], or leave the file out",
             classes.as_deref().unwrap_or_default(),
             source.path.display()
-        ))),
+        ))
+        .into()),
         (None, _) => Ok(()),
     }
 }

@@ -104,7 +104,7 @@ pub struct Preflight {
 ///
 /// # Errors
 /// Every error that would stop the job before its first point; see [`make_plan`].
-pub fn check(options: &JobOptions) -> Result<Preflight> {
+pub fn check(options: &JobOptions) -> crate::Result<Preflight> {
     inspect(options).map(|(preflight, _)| preflight)
 }
 
@@ -112,7 +112,7 @@ pub fn check(options: &JobOptions) -> Result<Preflight> {
 ///
 /// # Errors
 /// As [`check`].
-pub fn inspect(options: &JobOptions) -> Result<(Preflight, Plan)> {
+pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     let directory = JobDirectory::new(&options.output.directory);
     check_nothing_in_the_way(&directory)?;
     check_results_are_ours(&directory, options.output.page)?;
@@ -137,7 +137,7 @@ pub fn inspect(options: &JobOptions) -> Result<(Preflight, Plan)> {
 ///
 /// # Errors
 /// As [`Preflight::passes`].
-pub(crate) fn require_memory_and_disk(plan: &Plan, threads: usize) -> Result<()> {
+pub(crate) fn require_memory_and_disk(plan: &Plan, threads: usize) -> crate::Result<()> {
     let mut preflight = Preflight::of(plan, threads, KeptPoints::by_headers(plan));
     let memory_is_short = preflight.memory_free.is_some_and(|free| free < preflight.memory);
     if has_filter(plan) && (preflight.disk_is_short() || memory_is_short) {
@@ -207,11 +207,11 @@ impl Preflight {
     /// Checks that the machine has what the job needs.
     ///
     /// # Errors
-    /// [`Error::NoTerrain`] if no point will be left, [`Error::Io`] if nothing can be written to the output directory or its disk is too small, [`Error::Memory`] if too little
-    /// memory is free.
-    pub fn passes(&self) -> Result<()> {
+    /// [`crate::Error::NoTerrain`] if no point will be left, [`Error::Io`] if nothing can be written to the output directory or its disk is
+    /// too small, [`Error::Memory`] if too little memory is free.
+    pub fn passes(&self) -> crate::Result<()> {
         if let Some(why) = &self.nothing_is_left {
-            return Err(Error::NoTerrain(why.clone()));
+            return Err(crate::Error::NoTerrain(why.clone()));
         }
         machine::check_writable(&self.output)?;
         if let Some(free) = self.disk_free.filter(|free| *free < self.disk) {
@@ -222,7 +222,7 @@ impl Preflight {
                 self.earlier_results(),
                 self.because_of_stretch()
             );
-            return Err(Error::io("write to", &self.output)(io::Error::new(io::ErrorKind::StorageFull, what)));
+            return Err(Error::io("write to", &self.output)(io::Error::new(io::ErrorKind::StorageFull, what)).into());
         }
         address_space::require(self.memory, address_space::at_start(), || "the job".into())?;
         match self.memory_free.filter(|free| *free < self.memory) {
@@ -232,7 +232,8 @@ impl Preflight {
                 mebibytes(self.memory),
                 mebibytes(free),
                 self.because_of_stretch()
-            ))),
+            ))
+            .into()),
             None => Ok(()),
         }
     }

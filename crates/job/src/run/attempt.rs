@@ -31,11 +31,11 @@ use crate::run::run_context::RunContext;
 use crate::run::single_process::SingleProcess;
 use crate::run::stage_costs::stage_costs;
 use crate::run::temporary_bytes::TemporaryBytes;
+use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
-use std::io::ErrorKind;
 use std::sync::Mutex;
 use sys::threads::on_threads;
-use sys::{Error, Result, disk};
+use sys::{ErrorKind, disk};
 
 /// What the user must know where a lock keeps nobody out.
 pub(crate) const NO_LOCKS: &str =
@@ -86,7 +86,7 @@ pub(crate) fn run_until_it_fits(
     let directory = JobDirectory::new(&options.output.directory);
     check_nothing_in_the_way(&directory)?;
     let (mut lock, mut earlier) = (None, None);
-    if !disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.is_empty() {
+    if !disk::list(directory.job()).map_err(sys::Error::io("read", directory.job()))?.is_empty() {
         // Before anything else can fail: an earlier run may have been cut off while its results took their places.
         lock = Some(directory.lock()?);
         earlier = read_earlier(&directory, run)?;
@@ -169,7 +169,7 @@ pub(crate) fn coarsening_of(
     directory: &JobDirectory,
     earlier: Option<&EarlierRun>,
     fingerprint: &Fingerprint,
-) -> Result<LatticeCoarsening> {
+) -> sys::Result<LatticeCoarsening> {
     let Some(mut known) = earlier.and_then(|earlier| earlier.coarsening(fingerprint)) else {
         return Ok(LatticeCoarsening::default());
     };
@@ -179,7 +179,7 @@ pub(crate) fn coarsening_of(
 
 /// Reads what an earlier run left, unless the job is to start over. If it left all its results, they take their places in any case:
 /// it may have been cut off among them.
-pub(crate) fn read_earlier(directory: &JobDirectory, run: RunOptions) -> Result<Option<EarlierRun>> {
+pub(crate) fn read_earlier(directory: &JobDirectory, run: RunOptions) -> sys::Result<Option<EarlierRun>> {
     let mut earlier = EarlierRun::read(directory)?;
     if let Some(earlier) = earlier.as_mut() {
         earlier.place_whole_results(directory)?;
@@ -291,27 +291,27 @@ fn end(
 ) -> Result<Report> {
     let is_by_tasks = work == EarlierWork::ByTasks;
     let outcome = outcome.and_then(|report| match place_results_of_finished_job(directory) {
-        Err(Error::Io { source, .. }) if is_by_tasks && source.kind() == ErrorKind::NotFound => {
+        Err(sys::Error::Io { source, .. }) if is_by_tasks && source.kind() == std::io::ErrorKind::NotFound => {
             Err(Error::DamagedSteps)
         }
-        placed => placed.map(|()| report),
+        placed => Ok(placed.map(|()| report)?),
     });
     match outcome {
         Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),
         // With a corrected configuration a job of several parts may start over, so nothing is promised.
-        Err(why @ Error::Config(_)) if steps > 0 && !is_one_part => Err(why),
+        Err(why @ Error::System(sys::Error::Config(_))) if steps > 0 && !is_one_part => Err(why),
         Err(why) if may_go_on(&why) && steps > 0 => {
             Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
         }
         outcome => {
             let cleaned = remove_job(directory);
             // The first error is the one to report.
-            outcome.and_then(|report| cleaned.map(|()| report))
+            outcome.and_then(|report| Ok(cleaned.map(|()| report)?))
         }
     }
 }
 
 /// Tells whether another run can make use of the finished steps: with the same options, or with others for how tiles look.
 fn may_go_on(why: &Error) -> bool {
-    why.exit_code() == 1 || matches!(why, Error::Config(_) | Error::Io { .. })
+    why.kind() == ErrorKind::Retry || matches!(why, Error::System(sys::Error::Config(_) | sys::Error::Io { .. }))
 }

@@ -105,12 +105,15 @@ pub(crate) fn is_rest(directory: &JobDirectory) -> Result<bool> {
 /// Ends the removal of the rest of a finished job, if one is there.
 ///
 /// # Errors
-/// [`Error::InUse`] if another process works in the job directory, [`Error::Io`] if a file cannot be removed.
-pub(crate) fn remove_rest(directory: &JobDirectory, threads: usize) -> Result<()> {
+/// [`crate::Error::InUse`] if another process works in the job directory, [`Error::Io`] if a file cannot be removed.
+pub(crate) fn remove_rest(directory: &JobDirectory, threads: usize) -> crate::Result<()> {
     if !is_rest(directory)? {
         return Ok(());
     }
     let _lock = directory.lock()?;
     // Another process may have begun a job meanwhile.
-    if is_rest(directory)? { on_threads(threads, || remove_job(directory)) } else { Ok(()) }
+    if is_rest(directory)? {
+        on_threads(threads, || remove_job(directory))?;
+    }
+    Ok(())
 }

@@ -161,8 +161,8 @@ pub(crate) fn while_freeing<T>(
     run: &RunContext,
     plan: &Plan,
     partition: &Partition,
-    work: impl FnOnce(&Freeing) -> Result<T>,
-) -> Result<T> {
+    work: impl FnOnce(&Freeing) -> crate::Result<T>,
+) -> crate::Result<T> {
     let options = &plan.options;
     let freeing = &Freeing {
         run,
@@ -188,6 +188,6 @@ pub(crate) fn while_freeing<T>(
         let outcome = work(freeing);
         drop(end);
         let freed = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        outcome.and_then(|outcome| freed.map(|()| outcome))
+        outcome.and_then(|outcome| Ok(freed.map(|()| outcome)?))
     })
 }

@@ -51,7 +51,7 @@ pub(crate) fn mesh_and_tiles(
     plan: &Plan,
     partition: &Partition,
     bounds: Bounds<3>,
-) -> Result<MeshInTiles> {
+) -> crate::Result<MeshInTiles> {
     let appearance = |sites| {
         let max_edge = max_edge_rule(run, plan, partition, bounds, sites)?;
         TileAppearance::new(plan, partition.summary.counts.max_rgb, bounds, max_edge).map(Arc::new)
@@ -64,7 +64,7 @@ pub(crate) fn mesh_and_tiles(
     let mesh = mesh_part(run, plan, partition, writing)?;
     match mesh.tiles.waiting.len() {
         0 => Ok(mesh),
-        waiting => Err(Error::Broken(format!("{waiting} tiles were not written"))),
+        waiting => Err(Error::Broken(format!("{waiting} tiles were not written")).into()),
     }
 }
 
@@ -73,7 +73,12 @@ pub(crate) fn mesh_and_tiles(
 ///
 /// # Errors
 /// Those of the four steps, and of [`while_freeing`].
-pub(crate) fn mesh_part(run: &RunContext, plan: &Plan, partition: &Partition, writing: Writing) -> Result<MeshInTiles> {
+pub(crate) fn mesh_part(
+    run: &RunContext,
+    plan: &Plan,
+    partition: &Partition,
+    writing: Writing,
+) -> crate::Result<MeshInTiles> {
     while_freeing(run, plan, partition, |freeing| do_steps(run, plan, partition, writing, freeing))
 }
 
@@ -83,7 +88,7 @@ fn do_steps(
     partition: &Partition,
     writing: Writing,
     freeing: &Freeing,
-) -> Result<MeshInTiles> {
+) -> crate::Result<MeshInTiles> {
     let points = partition.tree.tiles().map(|tile| partition.points(tile)).sum();
     let stage = run.progress.stage("mesh", points, "points");
     let activity = run.progress.activity("triangulate", "points");

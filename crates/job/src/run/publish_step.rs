@@ -84,7 +84,7 @@ pub(crate) struct MeshFigures {
 }
 
 /// Checks that there is a terrain to look at.
-pub(crate) fn some_triangles(written: &TileStats, plan: &Plan) -> Result<()> {
+pub(crate) fn some_triangles(written: &TileStats, plan: &Plan) -> crate::Result<()> {
     if written.triangles > 0 {
         return Ok(());
     }
@@ -97,7 +97,8 @@ pub(crate) fn some_triangles(written: &TileStats, plan: &Plan) -> Result<()> {
         let by_length = written.cut_triangles - written.slivers;
         return Err(Error::Config(format!(
             "[output] max_edge leaves out all {by_length} triangles{slivers}: give a greater one"
-        )));
+        ))
+        .into());
     }
     Err(no_triangle(plan))
 }

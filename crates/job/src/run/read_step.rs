@@ -8,7 +8,6 @@ use crate::plan::make_plan::replan_without;
 use crate::progress::stage::JobProgress;
 use crate::records::{JobStep, StepOutput};
 use crate::run::run_context::RunContext;
-use sys::Result;
 
 /// Reads the points, unless an earlier run did.
 ///
@@ -17,7 +16,7 @@ use sys::Result;
 ///
 /// # Errors
 /// Those of [`read_points`] and [`replan_without`].
-pub(crate) fn read(run: &RunContext, mut plan: Plan, earlier: Option<Partition>) -> Result<(Plan, Partition)> {
+pub(crate) fn read(run: &RunContext, mut plan: Plan, earlier: Option<Partition>) -> crate::Result<(Plan, Partition)> {
     if let Some(partition) = earlier {
         return take_over(run, plan, partition);
     }
@@ -46,7 +45,7 @@ pub(crate) fn read(run: &RunContext, mut plan: Plan, earlier: Option<Partition>)
     }
 }
 
-fn take_over(run: &RunContext, mut plan: Plan, partition: Partition) -> Result<(Plan, Partition)> {
+fn take_over(run: &RunContext, mut plan: Plan, partition: Partition) -> crate::Result<(Plan, Partition)> {
     let stage = run.progress.stage("read", plan.records, "points");
     if partition.skipped != plan.skipped {
         plan = replan_without(plan, &partition.skipped)?;

@@ -16,7 +16,7 @@ use tiles::options::MaxEdge;
 /// Begins a run of a job of several parts, as [`crate::run::resume::start`] does of others. What is in the folders of its parts stays if the job is the same.
 ///
 /// # Errors
-/// [`Error::Io`] on the job directory.
+/// [`sys::Error::Io`] on the job directory.
 pub(crate) fn start_parts<'a>(
     directory: &'a JobDirectory,
     header: &JobHeader,
@@ -90,7 +90,7 @@ fn new_id() -> u64 {
 /// Returns the entries of a part, whose folder is locked, that stay, and its partition if that does.
 ///
 /// # Errors
-/// [`Error::Io`] on its folder.
+/// [`sys::Error::Io`] on its folder.
 pub(crate) fn resume_part(
     directory: &JobDirectory,
     entries: Vec<JournalEntry>,

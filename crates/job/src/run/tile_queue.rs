@@ -48,7 +48,7 @@ struct QueueState {
     written: Vec<bool>,
     stats: TileStats,
     /// The first error.
-    failure: Option<Error>,
+    failure: Option<crate::Error>,
 }
 
 /// How tiles look, and what they are drawn on.
@@ -134,12 +134,15 @@ impl<'a> TileQueue<'a> {
     }
 
     /// Runs `work` unless something failed before. Keeps the first error for [`TileQueue::finish`].
-    pub(crate) fn attempt<T>(&self, work: impl FnOnce() -> Result<T>) -> Option<T> {
+    pub(crate) fn attempt<T, E: Into<crate::Error>>(
+        &self,
+        work: impl FnOnce() -> std::result::Result<T, E>,
+    ) -> Option<T> {
         if self.has_failed.load(Ordering::Relaxed) {
             return None;
         }
-        let keep = |error| {
-            self.state().failure.get_or_insert(error);
+        let keep = |error: E| {
+            self.state().failure.get_or_insert(error.into());
             self.has_failed.store(true, Ordering::Relaxed);
         };
         work().map_err(keep).ok()
@@ -149,7 +152,7 @@ impl<'a> TileQueue<'a> {
     ///
     /// # Errors
     /// The first error of all.
-    pub(crate) fn finish(self) -> Result<WrittenTiles> {
+    pub(crate) fn finish(self) -> crate::Result<WrittenTiles> {
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(failure) = state.failure {
             return Err(failure);

@@ -56,7 +56,7 @@ impl<'a> TreeWalk<'a> {
         }
     }
 
-    fn leaf(&self, scope: &Scope<'a>, node: NodeIndex, tile: TileIndex) -> Result<LeafStats> {
+    fn leaf(&self, scope: &Scope<'a>, node: NodeIndex, tile: TileIndex) -> crate::Result<LeafStats> {
         let (step, points) = (JobStep::Leaf(tile), self.partition.points(tile));
         let triangulate = || self.activity.time(points, || self.triangulate(tile));
         let stats: LeafStats = self.run.journal.step(step, triangulate)?;
@@ -69,14 +69,14 @@ impl<'a> TreeWalk<'a> {
         Ok(stats)
     }
 
-    fn triangulate(&self, tile: TileIndex) -> Result<StepOutput<LeafStats>> {
+    fn triangulate(&self, tile: TileIndex) -> crate::Result<StepOutput<LeafStats>> {
         let RunContext { store, triangulator, .. } = *self.run;
         let points = self.points.as_ref();
         let points = points.ok_or_else(|| Error::Broken(format!("the points of tile {tile} are gone")))?;
         triangulate_leaf(self.plan, self.partition, points, store, triangulator, tile)
     }
 
-    fn merge(&self, scope: &Scope<'a>, node: NodeIndex) -> Result<()> {
+    fn merge(&self, scope: &Scope<'a>, node: NodeIndex) -> crate::Result<()> {
         let RunContext { store, journal, threads, .. } = *self.run;
         let below = self.partition.tree.merged_by(node);
         if below.iter().any(|&child| self.unmerged.sites(child).is_some()) {
@@ -87,7 +87,7 @@ impl<'a> TreeWalk<'a> {
         let cell = self.partition.tree.node(node).cell;
         let merge = || self.activity.time(0, || merge_frontiers(self.plan, cell, &sources, store, memory, node));
         match journal.step(JobStep::Merge(node), merge) {
-            Err(Error::Memory(_)) => self.leave_out(node, &below),
+            Err(crate::Error::System(Error::Memory(_))) => self.leave_out(node, &below),
             merged => {
                 for tile in merged? {
                     self.queue.push(scope, FinishedTile { tile, last_merge: node });
@@ -98,7 +98,7 @@ impl<'a> TreeWalk<'a> {
     }
 
     /// Notes that `node` is not merged. It never passes up more sites than come from `below`.
-    fn leave_out(&self, node: NodeIndex, below: &[NodeIndex]) -> Result<()> {
+    fn leave_out(&self, node: NodeIndex, below: &[NodeIndex]) -> crate::Result<()> {
         let sites = |child: &NodeIndex| match self.unmerged.sites(*child) {
             Some(sites) => Ok(sites),
             None => Frontier::count(self.run.store, *child),

@@ -292,6 +292,7 @@ fn quoted(name: &str) -> String {
 mod tests {
     use super::*;
     use crate::lines::feature::{LineFeature, LineShape};
+    use sys::ErrorKind;
 
     /// Writes a file with the layers `a` and, if wanted, `b`, each with one line, and returns its bytes.
     fn package(has_two: bool) -> Vec<u8> {
@@ -397,7 +398,7 @@ mod tests {
         let leaf = (1..bytes.len() / size).rev().find(leaf).unwrap();
         bytes[leaf * size + 4] /= 2;
         let error = read_bytes(&bytes, "").map(drop).unwrap_err();
-        assert!(error.exit_code() == 3 && error.to_string().contains("is damaged ("), "{error}");
+        assert!(error.kind() == ErrorKind::Input && error.to_string().contains("is damaged ("), "{error}");
     }
 
     /// Registers the view or table `v` as a layer.
@@ -470,7 +471,7 @@ mod tests {
         ] {
             let layer = if sql.contains("'v', 'shape'") { "layer = \"v\"" } else { "" };
             let error = read_changed(&sql, layer).map(drop).unwrap_err();
-            assert!(error.exit_code() == 3 && error.to_string().contains(word), "{sql}: {error}");
+            assert!(error.kind() == ErrorKind::Input && error.to_string().contains(word), "{sql}: {error}");
         }
         // An attribute that is not read may be computed.
         let beside = "ALTER TABLE a ADD COLUMN more TEXT GENERATED ALWAYS AS (sort || sort) VIRTUAL";
@@ -502,7 +503,7 @@ mod tests {
         let cut = (16..sound.len()).step_by(1777).map(|length| read_bytes(&sound[..length], "layer = \"b\""));
         // The last pages may be empty.
         let errors: Vec<Error> = cut.filter_map(Result::err).collect();
-        assert!(errors.len() > 5 && errors.iter().all(|error| error.exit_code() == 3), "{errors:?}");
+        assert!(errors.len() > 5 && errors.iter().all(|error| error.kind() == ErrorKind::Input), "{errors:?}");
         for at in (100..sound.len()).step_by(631) {
             let mut damaged = sound.clone();
             damaged[at..(at + 40).min(sound.len())].fill(0xa5);

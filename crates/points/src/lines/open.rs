@@ -74,6 +74,7 @@ const IN_GDB: &str = "is part of an Esri file geodatabase, which only its own pr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sys::ErrorKind;
 
     fn read_bytes(name: &str, bytes: &[u8]) -> Result<LineFile> {
         let folder = tempfile::tempdir().unwrap();
@@ -96,7 +97,7 @@ mod tests {
             ("a.geojson", b"{", "GeoJSON"),
         ] {
             let error = read_bytes(name, bytes).unwrap_err();
-            assert_eq!(error.exit_code(), 3);
+            assert_eq!(error.kind(), ErrorKind::Input);
             assert!(error.to_string().contains(word), "{error}");
         }
         assert!(is_side_file(Path::new("a/b.DBF")) && is_side_file(Path::new("b.shp.xml")));

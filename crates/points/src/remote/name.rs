@@ -124,6 +124,7 @@ pub(crate) fn address(name: &str) -> Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sys::ErrorKind;
 
     #[test]
     fn a_query_is_hidden_and_kept() {
@@ -137,7 +138,7 @@ mod tests {
         assert_eq!(name(&second), second, "a public name stays as it is");
         assert_eq!(address(&second).unwrap(), "https://name.test/a.laz?X-Amz-Signature=def");
         assert_eq!(address("https://name.test/a.laz").unwrap(), "https://name.test/a.laz");
-        assert_eq!(address("https://name.test/b.laz?...").unwrap_err().exit_code(), 2);
+        assert_eq!(address("https://name.test/b.laz?...").unwrap_err().kind(), ErrorKind::Usage);
         assert_eq!(name("s3://bucket/a?[b]*.laz"), "s3://bucket/a?[b]*.laz", "in a bucket these are a pattern");
     }
 

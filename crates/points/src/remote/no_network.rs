@@ -81,15 +81,16 @@ pub(crate) fn set_space(_: u64) {}
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sys::ErrorKind;
 
     #[test]
     fn the_refusal_says_how_to_get_the_feature() {
         let Err(error) = HeldFile::open(Path::new("https://host/a.laz")) else { panic!("a file is there") };
-        assert_eq!(error.exit_code(), 2);
+        assert_eq!(error.kind(), ErrorKind::Usage);
         assert!(
             error.to_string().contains("https://host/a.laz: this program was built without inputs by URL"),
             "{error}"
         );
-        assert_eq!(files_at("s3://bucket/*.laz").unwrap_err().exit_code(), 2);
+        assert_eq!(files_at("s3://bucket/*.laz").unwrap_err().kind(), ErrorKind::Usage);
     }
 }

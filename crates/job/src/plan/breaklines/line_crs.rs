@@ -189,6 +189,7 @@ mod tests {
     use breaklines::FeatureKind;
     use crs::CrsChoice;
     use points::lines::{LineFeature, LineShape};
+    use sys::ErrorKind;
     use sys::Warnings;
 
     fn system(text: &str) -> Crs {
@@ -305,11 +306,11 @@ mod tests {
             (&degrees, &Crs::default(), "do not say where they are"),
         ] {
             let error = bring(own, "auto", points).unwrap_err();
-            assert_eq!(error.exit_code(), 2);
+            assert_eq!(error.kind(), ErrorKind::Usage);
             assert!(error.to_string().contains(word) && error.to_string().contains("crs = \"points\""), "{error}");
         }
         let beyond = bring_vertex([87.0, 0.0, 1.0], &degrees, "auto", &zone_15).unwrap_err();
-        assert!(beyond.exit_code() == 3 && beyond.to_string().contains("feature 1"), "{beyond}");
+        assert!(beyond.kind() == ErrorKind::Input && beyond.to_string().contains("feature 1"), "{beyond}");
     }
     /// Returns the height that 10 becomes, and what is said.
     fn height(own: &Crs, rest: &str, points: &Crs) -> (f64, String) {

@@ -195,6 +195,7 @@ mod tests {
     use super::*;
     use crs::Crs;
     use points::lines::LineShape;
+    use sys::ErrorKind;
 
     fn extended(kind: FeatureKind, heights: [f64; 4]) -> Result<[f64; 2]> {
         let corners = [[-50.0, -50.0], [60.0, -50.0], [60.0, 70.0], [-50.0, 70.0]];
@@ -219,7 +220,7 @@ mod tests {
             let error = extended(FeatureKind::Lake, heights).unwrap_err();
             let text = error.to_string();
             assert!(
-                error.exit_code() == 3 && text.contains("stands for no height") && text.contains("heights ="),
+                error.kind() == ErrorKind::Input && text.contains("stands for no height") && text.contains("heights ="),
                 "{text}"
             );
         }
@@ -235,7 +236,7 @@ mod tests {
         for wrong in [-1e12, 1e7] {
             let error = extended(FeatureKind::Lake, [wrong; 4]).unwrap_err();
             let text = error.to_string();
-            assert!(error.exit_code() == 3 && text.contains("a.shp: feature 4 has the height"), "{text}");
+            assert!(error.kind() == ErrorKind::Input && text.contains("a.shp: feature 4 has the height"), "{text}");
         }
     }
 }

@@ -34,8 +34,8 @@ pub(crate) struct JoinedParts {
 /// Merges what the parts send up, or what an interrupted run left of it. `all` is what the parts hold.
 ///
 /// # Errors
-/// Those of [`merge_frontiers`]; [`sys::Error::InUse`] if another process does it.
-pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, all: SitesOfParts) -> Result<()> {
+/// Those of [`merge_frontiers`]; [`crate::Error::InUse`] if another process does it.
+pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, all: SitesOfParts) -> crate::Result<()> {
     let parts = job.parts.all().len() as u64;
     let directory = &job.directory.join();
     let lock = directory.lock_within()?;
@@ -58,7 +58,7 @@ pub(crate) fn join_parts(job: &PartsJob, stores: &PartStores, all: SitesOfParts)
 ///
 /// # Errors
 /// As [`join_parts`].
-pub(crate) fn merge_through(job: &PartsJob, stores: &PartStores, last: PartIndex) -> Result<Vec<TileIndex>> {
+pub(crate) fn merge_through(job: &PartsJob, stores: &PartStores, last: PartIndex) -> crate::Result<Vec<TileIndex>> {
     let complete = nodes_completed_by(&job.parts.tree, job.parts.node(last));
     if complete.is_empty() {
         return Ok(Vec::new());
@@ -69,7 +69,7 @@ pub(crate) fn merge_through(job: &PartsJob, stores: &PartStores, last: PartIndex
     let session = PartSession::begin(directory, lock, header, entries_of(directory, header)?)?;
     let context = &session.context(job);
     let merges = complete.into_iter().map(|node| merge_at(job, stores, context, node));
-    let finished = merges.collect::<Result<Vec<_>>>()?;
+    let finished = merges.collect::<crate::Result<Vec<_>>>()?;
     // What the tiles needed that these merges finish may go now.
     session.store.sync()?;
     session.end()?;
@@ -92,11 +92,12 @@ fn nodes_completed_by(tree: &Tree, leaf: NodeIndex) -> Vec<NodeIndex> {
 /// Removes from the journal of the merges what a power failure has damaged: it can be done again.
 ///
 /// # Errors
-/// [`sys::Error::Io`] on its folder, [`sys::Error::InUse`] if another process has it.
-pub(crate) fn drop_damaged_merges(job: &PartsJob) -> Result<()> {
+/// [`sys::Error::Io`] on its folder, [`crate::Error::InUse`] if another process has it.
+pub(crate) fn drop_damaged_merges(job: &PartsJob) -> crate::Result<()> {
     let (directory, header) = (&job.directory.join(), job.header(job.above()));
     let lock = directory.lock_within()?;
-    PartSession::begin(directory, lock, header, whole_entries(directory, entries_of(directory, header)?)?)?.end()
+    let entries = whole_entries(directory, entries_of(directory, header)?)?;
+    Ok(PartSession::begin(directory, lock, header, entries)?.end()?)
 }
 
 /// Returns the entries whose records hold what was written.
@@ -114,7 +115,7 @@ fn whole_entries(directory: &JobDirectory, mut entries: Vec<JournalEntry>) -> Re
 }
 
 /// Merges at all merge nodes at and below `node`, children first.
-fn merge_below(job: &PartsJob, stores: &PartStores, context: &RunContext, node: NodeIndex) -> Result<()> {
+fn merge_below(job: &PartsJob, stores: &PartStores, context: &RunContext, node: NodeIndex) -> crate::Result<()> {
     let tree = &job.parts.tree;
     let NodeKind::Inner([low, high]) = tree.node(node).kind else { return Ok(()) };
     let below = |child| merge_below(job, stores, context, child);
@@ -127,7 +128,12 @@ fn merge_below(job: &PartsJob, stores: &PartStores, context: &RunContext, node: 
 }
 
 /// Merges at `node`, unless that is done. Returns the tiles that this finishes.
-fn merge_at(job: &PartsJob, stores: &PartStores, context: &RunContext, node: NodeIndex) -> Result<Vec<TileIndex>> {
+fn merge_at(
+    job: &PartsJob,
+    stores: &PartStores,
+    context: &RunContext,
+    node: NodeIndex,
+) -> crate::Result<Vec<TileIndex>> {
     let tree = &job.parts.tree;
     let merge = || {
         let below = tree.merged_by(node);

@@ -11,19 +11,19 @@ use crate::run::parts::part_journal::PartSession;
 use crate::run::parts::part_store::PartStores;
 use crate::run::parts::parts_job::PartsJob;
 use std::sync::PoisonError;
-use sys::{Error, Result};
+use sys::Error;
 
 /// Makes the coarser tiles of `part`, unless that is done. If viewers get none, because the job has no tileset, notes that.
 ///
 /// # Errors
-/// Those of [`make_levels`]; [`Error::InUse`] if another process has the part.
+/// Those of [`make_levels`]; [`crate::Error::InUse`] if another process has the part.
 pub(crate) fn levels_of_part(
     job: &PartsJob,
     stores: &PartStores,
     joined: &JoinedParts,
     part: PartIndex,
     has_tileset: bool,
-) -> Result<LevelStats> {
+) -> crate::Result<LevelStats> {
     let (directory, header) = (&job.directory.part(part), job.header(part));
     let lock = directory.lock_within()?;
     let entries = entries_of(directory, header)?;
@@ -42,5 +42,5 @@ pub(crate) fn levels_of_part(
         stats = make_levels(&context, job.plan, part, hierarchy, &joined.appearance.style, &no_other)?.stats;
     }
     let stages = context.stages.into_inner().unwrap_or_else(PoisonError::into_inner);
-    session.finish(JobStep::Levels, stats, stages, Vec::new())
+    Ok(session.finish(JobStep::Levels, stats, stages, Vec::new())?)
 }

@@ -14,14 +14,14 @@ use crate::run::parts::parts_job::PartsJob;
 use crate::run::parts::read_phase::points_of;
 use crate::run::resume_parts::resume_part;
 use crate::run::tile_queue::TileAppearance;
+use crate::{Error, Result};
 use std::sync::{Arc, PoisonError};
-use sys::{Error, Result};
 
 /// Meshes a part whose points have all been read, unless that is done. Temporary files of other parts take `others` bytes; `None` where
 /// nobody knows.
 ///
 /// # Errors
-/// Those of the steps; [`sys::Error::DamagedSteps`] if the points are damaged; [`sys::Error::InUse`] if another process has the
+/// Those of the steps; [`Error::DamagedSteps`] if the points are damaged; [`Error::InUse`] if another process has the
 /// part.
 pub(crate) fn mesh_one(
     job: &PartsJob,
@@ -58,7 +58,7 @@ pub(crate) fn mesh_one(
     Ok(meshed)
 }
 
-fn done(job: &PartsJob, directory: &JobDirectory, part: PartIndex) -> Result<Option<MeshedPart>> {
+fn done(job: &PartsJob, directory: &JobDirectory, part: PartIndex) -> sys::Result<Option<MeshedPart>> {
     let step = JobStep::MeshPart;
     let done = Done::find(&entries_of_steps(directory, job.header(part), |found| found == step)?, step)?;
     Ok(done.map(|done| done.figures))
@@ -96,7 +96,7 @@ fn mesh(
         by_task: others.is_none(),
         stored: session.store.bytes(),
     };
-    session.finish(JobStep::MeshPart, meshed, stages, Vec::new())
+    Ok(session.finish(JobStep::MeshPart, meshed, stages, Vec::new())?)
 }
 
 /// Tells whether what `step` needs, besides the steps that were lost with it, is still whole. It may have been freed, and a hole reads as
@@ -119,7 +119,7 @@ fn can_do_again(store: &Store, entries: &[JournalEntry], step: JobStep) -> bool 
 /// Removes from the journal of a part that is meshed the later steps that a power failure has damaged: they can be done again.
 ///
 /// # Errors
-/// [`Error::DamagedSteps`] if they cannot; [`Error::Io`] on the part's folder, [`Error::InUse`] if another process has it.
+/// [`Error::DamagedSteps`] if they cannot; [`sys::Error::Io`] on the part's folder, [`Error::InUse`] if another process has it.
 pub(crate) fn drop_damaged_steps(job: &PartsJob, part: PartIndex) -> Result<()> {
     let (directory, header) = (&job.directory.part(part), job.header(part));
     let lock = directory.lock_within()?;
@@ -138,5 +138,5 @@ pub(crate) fn drop_damaged_steps(job: &PartsJob, part: PartIndex) -> Result<()> 
     // What is complete no longer is.
     later.retain(|entry| !matches!(entry.step, JobStep::WriteWaiting | JobStep::Levels));
     entries.extend(later);
-    PartSession::begin(directory, lock, header, entries)?.end()
+    Ok(PartSession::begin(directory, lock, header, entries)?.end()?)
 }

@@ -40,9 +40,9 @@ use crate::run::parts::waiting_tiles::WaitingTiles;
 use crate::run::publish_step::wants_tileset;
 use crate::run::run_context::RunContext;
 use crate::tiles::curve::curvature_of;
+use crate::{Error, Result};
 use delaunay::geometry::Bounds;
 use std::collections::HashMap;
-use sys::{Error, Result};
 
 /// The walk through the phases after the plan.
 ///
@@ -67,7 +67,7 @@ fn do_phases(run: &RunContext, plan: Plan) -> Result<Report> {
     let (meshed, bounds, mut before) = read_and_mesh(job, stores)?;
     // Step 4 for the nodes above the parts.
     join_parts(job, stores, SitesOfParts { sites: meshed.iter().map(|part| part.leaves.sites).sum(), bounds })?;
-    let joined = JoinedParts::open(job)?.ok_or_else(|| Error::Broken("the parts are not joined".into()))?;
+    let joined = JoinedParts::open(job)?.ok_or_else(|| sys::Error::Broken("the parts are not joined".into()))?;
     // Steps 5 and 6 for the tiles that have waited.
     let borders = &ForeignBorders::new(job, stores, &joined);
     let mut tiles = meshed.iter().map(|part| part.tiles).fold(Default::default(), |mut all, part| {
@@ -87,8 +87,8 @@ fn do_phases(run: &RunContext, plan: Plan) -> Result<Report> {
 /// Returns the plan with the curvature of the scene, and writes it down, unless that is done.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be written, and those of [`curvature_of`].
-pub(crate) fn write_plan(journal: &Journal, directory: &JobDirectory, mut plan: Plan) -> Result<Plan> {
+/// [`sys::Error::Io`] if it cannot be written, and those of [`curvature_of`].
+pub(crate) fn write_plan(journal: &Journal, directory: &JobDirectory, mut plan: Plan) -> sys::Result<Plan> {
     if let (false, Some(claims)) = (journal.has(JobStep::Plan), plan.claims) {
         plan.curvature = curvature_of(&plan, claims.bounds)?;
     }

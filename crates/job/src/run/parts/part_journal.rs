@@ -35,7 +35,7 @@ impl<'a> PartSession<'a> {
         lock: Lock,
         header: PartHeader,
         entries: Vec<JournalEntry>,
-    ) -> Result<PartSession<'a>> {
+    ) -> crate::Result<PartSession<'a>> {
         let clock = JobClock::start();
         let records = records_of(&entries);
         let journal = Journal::begin(directory, &header, entries)?;

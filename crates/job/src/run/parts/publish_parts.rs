@@ -36,7 +36,7 @@ pub(crate) fn publish_parts(
     job: &PartsJob,
     stores: &PartStores,
     joined: &JoinedParts,
-) -> Result<Report> {
+) -> crate::Result<Report> {
     let plan = job.plan;
     let parts = job.parts.all().map(|part| PartProgress::of(&job.directory.part(part), job.header(part)));
     let parts = parts.collect::<Result<Vec<PartProgress>>>()?;
@@ -60,7 +60,7 @@ pub(crate) fn publish_parts(
         peak_memory: parts.iter().map(PartProgress::peak_memory).max().flatten().max(joined.peak_memory),
         cpu_s_of_tasks: if figures.by_tasks { processor_seconds(&parts) } else { 0.0 },
     };
-    write_report(run, plan, figures, published)
+    Ok(write_report(run, plan, figures, published)?)
 }
 
 /// What all parts hold together.
@@ -128,7 +128,7 @@ fn levels_and_root(
     stores: &PartStores,
     joined: &JoinedParts,
     figures: &PartFigures,
-) -> Result<TilesetContent> {
+) -> crate::Result<TilesetContent> {
     let PartsJob { plan, parts, .. } = *job;
     let hierarchy = Hierarchy::above_parts(&parts.tree, &figures.points, level_sizes(plan));
     let lock = joined.directory.lock_within()?;
@@ -148,7 +148,7 @@ fn levels_and_root(
     let hierarchy = &above.hierarchy;
     let root = TilesOfTree { store: &session.store, tree: &parts.tree, hierarchy, part_root: &part_root }.root()?;
     session.end()?;
-    TilesetContent::new(root, stats)
+    Ok(TilesetContent::new(root, stats)?)
 }
 
 fn root_of_part(job: &PartsJob, stores: &PartStores, part: PartIndex) -> Result<Option<TilesetNode>> {

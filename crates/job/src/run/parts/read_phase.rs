@@ -10,8 +10,8 @@ use crate::run::part_entries::{entries_of_steps, is_whole, open_store, records_o
 use crate::run::parts::done::Done;
 use crate::run::parts::part_journal::PartSession;
 use crate::run::parts::parts_job::PartsJob;
+use crate::{Error, Result};
 use delaunay::geometry::Bounds;
-use sys::{Error, Result};
 
 /// Reads the inputs that `reader` is the first to need, unless that is done. Inputs before them had `malformed` records.
 ///
@@ -37,10 +37,10 @@ pub(crate) fn read_for(job: &PartsJob, reader: PartIndex, malformed: u64) -> Res
     let stage = job.progress.stage("read", records, "points");
     let (read, blocks) = read_inputs(plan, parts, job.directory, reader, malformed, job.syncs_points(), &stage)?;
     let record = blocks.save(&session.store, reader)?;
-    session.finish(JobStep::Read(reader), read, vec![stage.finish()], vec![record])
+    Ok(session.finish(JobStep::Read(reader), read, vec![stage.finish()], vec![record])?)
 }
 
-fn done(job: &PartsJob, reader: PartIndex) -> Result<Option<Done<ReadInputs>>> {
+fn done(job: &PartsJob, reader: PartIndex) -> sys::Result<Option<Done<ReadInputs>>> {
     let step = JobStep::Read(reader);
     Done::find(&entries_of_steps(&job.directory.part(reader), job.header(reader), |found| found == step)?, step)
 }
@@ -48,7 +48,7 @@ fn done(job: &PartsJob, reader: PartIndex) -> Result<Option<Done<ReadInputs>>> {
 /// Returns where the points of `part` are, which all of its readers must have found.
 ///
 /// # Errors
-/// [`Error::DamagedSteps`] if what a reader wrote down is damaged, [`Error::Io`] if it cannot be read.
+/// [`Error::DamagedSteps`] if what a reader wrote down is damaged, [`sys::Error::Io`] if it cannot be read.
 pub(crate) fn points_of<'a>(job: &PartsJob<'a>, part: PartIndex) -> Result<PointsOfPart<'a>> {
     let mut points = PointsOfPart::none(job.plan, job.parts, part);
     for reader in job.parts.readers_of(part) {
@@ -56,7 +56,7 @@ pub(crate) fn points_of<'a>(job: &PartsJob<'a>, part: PartIndex) -> Result<Point
         let entries = entries_of_steps(&directory, job.header(reader), |found| found == step)?;
         let read = Done::find(&entries, step)?;
         let read: Done<ReadInputs> =
-            read.ok_or_else(|| Error::Broken(format!("the inputs of part {reader} were not read")))?;
+            read.ok_or_else(|| sys::Error::Broken(format!("the inputs of part {reader} were not read")))?;
         let store = open_store(&directory, &records_of(&entries))?;
         if job.checks && !entries.iter().all(|entry| is_whole(&directory, &store, entry)) {
             return Err(Error::DamagedSteps);
@@ -72,7 +72,7 @@ pub(crate) fn points_of<'a>(job: &PartsJob<'a>, part: PartIndex) -> Result<Point
 /// Sums up what all inputs held. Returns the sums and the box of the points.
 ///
 /// # Errors
-/// [`Error::Input`] if too many records are malformed, [`Error::NoTerrain`] or [`Error::Config`] if no point is left,
+/// [`sys::Error::Input`] if too many records are malformed, [`Error::NoTerrain`] or [`sys::Error::Config`] if no point is left,
 /// [`Error::TooFine`] if no mesh can hold the heights.
 pub(crate) fn sum_up<'a>(
     job: &PartsJob,

@@ -25,13 +25,13 @@ use sys::Result;
 /// totals over all of them.
 ///
 /// # Errors
-/// Those of the steps; [`sys::Error::InUse`] if another process has the part.
+/// Those of the steps; [`crate::Error::InUse`] if another process has the part.
 pub(crate) fn finish_part(
     borders: &ForeignBorders,
     part: PartIndex,
     waiting: &[TileIndex],
     before: Option<StageStats>,
-) -> Result<TileStats> {
+) -> crate::Result<TileStats> {
     let directory = &borders.job.directory.part(part);
     let entries = entries_of(directory, borders.job.header(part))?;
     if let Some(done) = Done::find(&entries, JobStep::WriteWaiting)? {
@@ -43,7 +43,7 @@ pub(crate) fn finish_part(
     let BorderSession { session, stage, .. } = session;
     let mut took = stage.finish();
     before.iter().for_each(|before| took.add(before));
-    session.finish(JobStep::WriteWaiting, stats, vec![took], Vec::new())
+    Ok(session.finish(JobStep::WriteWaiting, stats, vec![took], Vec::new())?)
 }
 
 /// A part whose waiting tiles this process writes.
@@ -59,13 +59,13 @@ impl<'a> BorderSession<'a> {
     /// Opens the folder of `part`, which is `directory`, to write some of `tiles` tiles.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the folder, [`sys::Error::InUse`] if another process has the part.
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the folder, [`crate::Error::InUse`] if another process has the part.
     pub(crate) fn begin(
         borders: &'a ForeignBorders<'a>,
         directory: &'a JobDirectory,
         part: PartIndex,
         tiles: usize,
-    ) -> Result<BorderSession<'a>> {
+    ) -> crate::Result<BorderSession<'a>> {
         let ForeignBorders { job, stores, .. } = *borders;
         let lock = directory.lock_within()?;
         let header = job.header(part);

@@ -49,7 +49,7 @@ impl<'a> WaitingTiles<'a> {
         job: &'a PartsJob<'a>,
         stores: &'a PartStores,
         appearance: Arc<TileAppearance>,
-    ) -> Result<WaitingTiles<'a>> {
+    ) -> crate::Result<WaitingTiles<'a>> {
         if job.checks {
             drop_damaged_merges(job)?;
         }
@@ -66,7 +66,7 @@ impl<'a> WaitingTiles<'a> {
     ///
     /// # Errors
     /// Those of the steps.
-    pub(crate) fn pass(&mut self, part: PartIndex, meshed: &MeshedPart) -> Result<()> {
+    pub(crate) fn pass(&mut self, part: PartIndex, meshed: &MeshedPart) -> crate::Result<()> {
         let opened = self.stores.open(part)?;
         free_inner_records(&opened.store, &opened.partition, &meshed.waiting)?;
         self.stored.insert(part, opened.store.bytes());
@@ -84,7 +84,7 @@ impl<'a> WaitingTiles<'a> {
         self.write_ready_tiles()
     }
 
-    fn write_ready_tiles(&mut self) -> Result<()> {
+    fn write_ready_tiles(&mut self) -> crate::Result<()> {
         let WaitingTiles { job, stores, appearance, open, waiting, stored, stages } = self;
         let joined = JoinedParts::so_far(job, appearance.clone())?;
         let borders = &ForeignBorders::new(job, stores, &joined);

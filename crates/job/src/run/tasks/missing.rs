@@ -15,8 +15,8 @@ use crate::run::tasks::dealing::deal;
 use crate::run::tasks::finished_job::in_place;
 use crate::run::tasks::planned_job::{PlannedJob, planned};
 use std::collections::BTreeSet;
+use sys::Result;
 use sys::threads::on_threads;
-use sys::{Error, Result};
 
 /// What is done of a planned job.
 pub(crate) struct JobProgressByPart<'a> {
@@ -29,7 +29,7 @@ impl<'a> JobProgressByPart<'a> {
     /// Reads the journals of all parts.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Broken`] on a journal.
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a journal.
     pub(crate) fn of(job: &'a PlannedJob) -> Result<JobProgressByPart<'a>> {
         JobProgressByPart::of_parts(job, |_| true)
     }
@@ -37,7 +37,7 @@ impl<'a> JobProgressByPart<'a> {
     /// Reads the journals of the `wanted` parts. Nothing of the others counts as done.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Broken`] on a journal.
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a journal.
     pub(crate) fn of_parts(job: &'a PlannedJob, wanted: impl Fn(PartIndex) -> bool) -> Result<JobProgressByPart<'a>> {
         let header = |part| PartHeader { job: job.header.id, part };
         let part = |part| match wanted(part) {
@@ -83,8 +83,8 @@ impl<'a> JobProgressByPart<'a> {
     /// Checks that `phase` is complete, as far as it is about the `wanted` parts.
     ///
     /// # Errors
-    /// [`Error::TooEarly`] names the tasks that are missing.
-    pub(crate) fn require(&self, phase: Phase, tasks: u32, wanted: impl Fn(PartIndex) -> bool) -> Result<()> {
+    /// [`crate::Error::TooEarly`] names the tasks that are missing.
+    pub(crate) fn require(&self, phase: Phase, tasks: u32, wanted: impl Fn(PartIndex) -> bool) -> crate::Result<()> {
         let mut missing = self.missing(phase, tasks);
         missing.retain(|(part, _)| wanted(*part));
         let numbers = if phase.is_by_part() { numbers(&missing) } else { self.missing_tasks(phase, tasks) };
@@ -97,26 +97,26 @@ fn numbers(missing: &[(PartIndex, u32)]) -> Vec<u32> {
 }
 
 /// Returns the error of a task that came before `phase` was complete: its `missing` tasks, of `count`.
-pub(crate) fn too_early(phase: Phase, missing: &[u32], count: u32) -> Error {
+pub(crate) fn too_early(phase: Phase, missing: &[u32], count: u32) -> crate::Error {
     let numbers: Vec<String> = missing.iter().map(u32::to_string).collect();
     let tasks = match missing.len() {
         1 => format!("task {} of {count} is", numbers[0]),
         _ => format!("tasks {} of {count} are", numbers.join(", ")),
     };
-    Error::TooEarly(format!(
+    crate::Error::TooEarly(format!(
         "the phase {phase} is not complete: {tasks} missing. Run them first; gdt-batch submit sends the tasks that are missing"
     ))
 }
 
 /// Returns the error of a task of a job that is not planned.
-pub(crate) fn not_planned() -> Error {
+pub(crate) fn not_planned() -> crate::Error {
     too_early(Phase::Plan, &[1], 1)
 }
 
 /// Returns all phases of a job with the tasks that are missing; of a finished job only `publish`, if it has something to remove.
 ///
 /// # Errors
-/// [`Error::Config`] if there are no inputs, [`Error::Io`] if one of them, or a journal, cannot be read.
+/// [`sys::Error::Config`] if there are no inputs, [`sys::Error::Io`] if one of them, or a journal, cannot be read.
 pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     let directory = JobDirectory::new(&options.output.directory);
     if let InPlace::ThisJob(_) = in_place(&directory, options, 0)? {
@@ -132,7 +132,7 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
 /// Returns all phases of a job that is planned with the tasks that are missing.
 ///
 /// # Errors
-/// [`Error::Io`] or [`Error::Broken`] on the job directory.
+/// [`sys::Error::Io`] or [`sys::Error::Broken`] on the job directory.
 pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     let directory = JobDirectory::new(&options.output.directory);
     let only_publish = || of_each(tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() });

@@ -12,6 +12,7 @@ mod plan_task;
 mod planned_job;
 pub(crate) mod status;
 
+use crate::Result;
 use crate::durable::directory::JobDirectory;
 use crate::options::{JobOptions, RunOptions};
 use crate::phase::{Phase, Task};
@@ -26,7 +27,6 @@ use crate::run::tasks::missing::{JobProgressByPart, not_planned};
 use crate::run::tasks::part_tasks::work_on_parts;
 use crate::run::tasks::plan_task::plan;
 use crate::run::tasks::planned_job::PlannedJob;
-use sys::Result;
 
 /// Does one task of one phase of a job. `walk` is what a process does that does all of it.
 ///

@@ -25,9 +25,10 @@ use crate::run::tasks::dealing::deal;
 use crate::run::tasks::missing::{JobProgressByPart, not_planned, too_early};
 use crate::run::tasks::planned_job::PlannedJob;
 use crate::tiles::write_tile::TileStats;
+use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
+use sys::disk;
 use sys::threads::on_threads;
-use sys::{Error, Result, disk};
 use tiles::options::OutputFormat;
 
 /// Does `phase` of the parts that fall to `task`. Returns how many these are, and what there is to say.
@@ -83,7 +84,7 @@ fn parts_of(job: &PlannedJob, phase: Phase, task: Task) -> Vec<PartIndex> {
 /// Shares the lock of the job directory; `None` if there is none.
 fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
     let journal = directory.journal();
-    let is_there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.contains(&journal);
+    let is_there = disk::list(directory.job()).map_err(sys::Error::io("read", directory.job()))?.contains(&journal);
     let is_left = || SingleProcess::find(directory, submission).map(|alone| alone.is_some());
     if is_there || is_left()? { directory.share_lock().map(Some) } else { Ok(None) }
 }

@@ -23,13 +23,13 @@ use crate::run::single_process::SingleProcess;
 use crate::run::tasks::planned_job::planned;
 use std::time::SystemTime;
 use sys::threads::on_threads;
-use sys::{Error, Result, disk};
+use sys::{Error, disk};
 
 /// Plans the job, unless that is done. Returns what there is to say.
 ///
 /// # Errors
-/// Those of the plan; [`Error::InUse`] if another process works in the job directory.
-pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> Result<Option<String>> {
+/// Those of the plan; [`crate::Error::InUse`] if another process works in the job directory.
+pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Option<String>> {
     let directory = &JobDirectory::new(&options.output.directory);
     let begun = SystemTime::now();
     check_nothing_in_the_way(directory)?;
@@ -89,7 +89,7 @@ fn modified_inputs(earlier: &EarlierRun, now: &Fingerprint) -> Option<String> {
 }
 
 /// Tells whether the job with this fingerprint is planned. Nobody starts it over meanwhile.
-fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u64) -> Result<bool> {
+fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u64) -> crate::Result<bool> {
     let journal = directory.journal();
     if !disk::exists(&journal).map_err(Error::io("read", &journal))? {
         return Ok(false);

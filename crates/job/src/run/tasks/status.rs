@@ -16,7 +16,8 @@ use sys::Result;
 /// Returns how far the job is.
 ///
 /// # Errors
-/// [`Error::Io`] or [`Error::Broken`] on the job directory, [`Error::Config`] if the options have changed since it was planned.
+/// [`sys::Error::Io`] or [`sys::Error::Broken`] on the job directory, [`sys::Error::Config`] if the options have changed since it was
+/// planned.
 pub(crate) fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStatus> {
     let directory = JobDirectory::new(&options.output.directory);
     let output = options.output.directory.clone();
