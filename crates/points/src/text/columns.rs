@@ -140,9 +140,6 @@ impl Columns {
         let texts: Vec<&[u8]> = pointed.iter().map(|line| &**line).collect();
         let decimal_comma = sign != DecimalSign::Point;
         let header = header::find(&texts, &candidates, options.header, options.columns.is_some());
-        if header.count.is_some() {
-            warnings.push("the first line holds one number, taken for the number of points and skipped");
-        }
         if let Some((at, _)) = header.lines.checked_sub(1).and_then(|last| rows.get(last)) {
             header_lines = at + 1;
         }
@@ -157,7 +154,12 @@ impl Columns {
             (Some(names), _) => {
                 let mut named = named_by_user(names)?;
                 let comments = before.iter().flat_map(|line| texts_of(line, &comments));
-                texts[..header.lines].iter().copied().chain(comments).for_each(|line| named.add_units_beside(line));
+                let row = data.first().copied().unwrap_or_default();
+                texts[..header.lines]
+                    .iter()
+                    .copied()
+                    .chain(comments)
+                    .for_each(|line| named.add_units_beside(line, row));
                 Some(named)
             }
             (None, Some(names)) => Some(names.map_err(bad)?),

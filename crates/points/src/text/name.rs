@@ -235,6 +235,12 @@ const BESIDE_AXES: [&str; 19] = [
 /// How unclear a name is that is none but for one of its words.
 const UNCLEAR: usize = 1000;
 
+/// What heights count from, as people write it in brackets after a name.
+const HEIGHT_DATUMS: [&str; 19] = [
+    "ahd", "amsl", "cgvd2013", "cgvd28", "dhhn2016", "dhhn92", "egm2008", "egm96", "ign69", "msl", "nap", "navd88",
+    "ngvd29", "nhn", "nn", "nn2000", "nzvd2016", "odn", "rh2000",
+];
+
 /// A column's name.
 pub(crate) struct Name {
     /// As [`NAMES`] has it.
@@ -314,10 +320,11 @@ impl Name {
         TextUnit::among(&self.other_words())
     }
 
-    /// Returns what is in brackets if that is neither a name nor a unit that is known.
+    /// Returns what is in brackets if that is neither a name nor a unit or datum of heights that is known.
     pub(crate) fn unknown_unit(&self) -> Option<String> {
         let words = self.other_words();
-        (!words.is_empty() && TextUnit::among(&words).is_none()).then(|| words.join(" "))
+        let is_datum = HEIGHT_DATUMS.contains(&letters(&words.concat()).as_str());
+        (!words.is_empty() && !is_datum && TextUnit::among(&words).is_none()).then(|| words.join(" "))
     }
 }
 

@@ -66,11 +66,14 @@ impl NamedColumns {
         [0, 1, 2].map(|axis| unit_alone(fields.get(self.place(axis)?)?))
     }
 
-    /// Takes the units of a line of the header into account where the names, which are the user's, say none: those in brackets after
-    /// other names of the same columns, and those of a line of units.
-    pub(crate) fn add_units_beside(&mut self, line: &[u8]) {
+    /// Takes the units of a line of the header into account where the names, which are the user's, state none: those in brackets after
+    /// other names of the same columns, and those of a line of units. A line with another number of columns than `row` names others.
+    pub(crate) fn add_units_beside(&mut self, line: &[u8], row: &[u8]) {
         for delimiter in CANDIDATES {
             let fields = delimiter.fields(line);
+            if fields.len() != delimiter.fields(row).len() {
+                continue;
+            }
             let field = |axis: usize| fields.get(self.place(axis)?).copied();
             let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(field) else { continue };
             let beside = [x, y, z].map(|field| Name::read(field).unit());
@@ -193,8 +196,8 @@ mod tests {
         assert!(named("X (Northing, ft);Y (Easting, ft);Z").units().unwrap().some_foot);
         assert_eq!(named("X (Easting);Y [m];Z (H)").unknown_units, [""; 0]);
         assert_eq!(named("X (Easting);Y [m];Z (ellipsoidal height)").unknown_units, [""; 0]);
-        assert_eq!(named("x (local);y (local);z [NAVD88]").unknown_units, ["local", "navd88"]);
-        assert_eq!(named("X (Easting / rod);Y [Northing (rod)];Z (m.s.l.)").unknown_units, ["rod", "m.s.l."]);
+        assert_eq!(named("x (local);y (local);z [NAVD88]").unknown_units, ["local"]);
+        assert_eq!(named("X (Easting / rod);Y [Northing (rod)];Z (m.s.l.)").unknown_units, ["rod"]);
     }
 
     #[test]
