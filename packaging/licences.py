@@ -18,7 +18,7 @@ def metadata(target):
 
 
 def crates_of(data):
-    """Returns the packages that are compiled into the program, without itself: no build scripts, no tests."""
+    """Returns the packages that are compiled into the program, without its own: no build scripts, no tests."""
     nodes = {node["id"]: node for node in data["resolve"]["nodes"]}
     root = data["resolve"]["root"]
     found, waiting = set(), [root]
@@ -27,7 +27,7 @@ def crates_of(data):
         if node["id"] not in found:
             found.add(node["id"])
             waiting += [dep["pkg"] for dep in node["deps"] if any(kind["kind"] is None for kind in dep["dep_kinds"])]
-    packages = [package for package in data["packages"] if package["id"] in found - {root}]
+    packages = [package for package in data["packages"] if package["id"] in found - set(data["workspace_members"])]
     return sorted(packages, key=lambda package: (package["name"], package["version"]))
 
 

@@ -1,4 +1,4 @@
-// The exact decisions of src/geometry/predicates.rs, ties included, for sites whose coordinates differ by at most 2^30. Rust puts
+// The exact decisions of crates/delaunay/src/geometry/predicates.rs, ties included, for sites whose coordinates differ by at most 2^30. Rust puts
 // this text in front of every shader that uses it, because WGSL has no include.
 //
 // All numbers are whole. Error bounds of f32 would not hold where a driver compiles with fast math, and i64 is optional. A number of

@@ -287,7 +287,11 @@ fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
 
 #[cfg(not(feature = "viewer"))]
 fn view_output(_: &ViewOptions, _: PrintOptions) -> Result<ExitCode> {
-    Err(sys::Error::Config("this build of gdt-batch has no server: build it with --features viewer".into()).into())
+    Err(sys::Error::Config(
+        "this program was built without its server: build it with the feature \"viewer\", which is on by default"
+            .into(),
+    )
+    .into())
 }
 
 #[cfg(feature = "gpu")]

@@ -6,7 +6,11 @@ use std::{env, fs};
 fn main() {
     let variable = |name| PathBuf::from(env::var_os(name).unwrap_or_default());
     let page = variable("CARGO_MANIFEST_DIR").join("../../viewer/dist/index.html");
-    println!("cargo::rerun-if-changed={}", page.display());
-    let text = fs::read(&page).unwrap_or_default();
-    fs::write(variable("OUT_DIR").join("index.html"), text).expect("the folder for what is built can be written to");
+    // A file that is missing would count as changed in every build, so its folder is watched then.
+    let watched = if page.is_file() { page.clone() } else { variable("CARGO_MANIFEST_DIR").join("../../viewer") };
+    println!("cargo::rerun-if-changed={}", watched.display());
+    let (text, target) = (fs::read(&page).unwrap_or_default(), variable("OUT_DIR").join("index.html"));
+    if fs::read(&target).ok().as_ref() != Some(&text) {
+        fs::write(target, text).expect("the folder for what is built can be written to");
+    }
 }

@@ -1,4 +1,4 @@
-// The table of blocks, as src/gpu/atlas.rs writes it. Rust puts this text in front of every shader that uses it. Such a shader declares
+// The table of blocks, as crates/delaunay-gpu/src/on_device/atlas.rs writes it. Rust puts this text in front of every shader that uses it. Such a shader declares
 // `blocks` itself.
 
 const BLOCK_SIDE = 32u;

@@ -1,4 +1,4 @@
-// The table of leaves, as src/gpu/atlas.rs writes it. Rust puts this text in front of every shader that uses it. Such a shader declares
+// The table of leaves, as crates/delaunay-gpu/src/on_device/atlas.rs writes it. Rust puts this text in front of every shader that uses it. Such a shader declares
 // `leaves` itself.
 
 // What lies outside the width and height of a leaf has this label: the colour of infinity.

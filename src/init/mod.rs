@@ -1,7 +1,7 @@
 //! `gdt-batch init`: a configuration for point clouds that runs as it is, or says what the user has to decide, with what was found in
 //! comments.
 //!
-//! The clouds are looked at as `check` does. If a job of them would be refused, `needs.rs` tries what the message of the refusal names.
+//! The clouds are looked at as `check` does. If a job of them would be refused, `required_options.rs` tries what the message of the refusal names.
 
 mod bad_files;
 mod clouds;

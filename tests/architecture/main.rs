@@ -106,7 +106,7 @@ fn a_circle_is_reported_with_all_its_arrows() {
 }
 
 #[test]
-fn circles_between_rooms_are_found_even_if_no_file_is_in_one() {
+fn circles_between_modules_are_found_even_if_no_file_is_in_one() {
     let files = [("a/x.rs", "use crate::b::x::X;"), ("b/y.rs", "use crate::a::y::Y;"), ("a/y.rs", ""), ("b/x.rs", "")];
     assert!(broken(files)[0].starts_with("a circle in lib/src/: a -> b -> a"));
     let sub = files.map(|(file, text)| (format!("r/{file}"), text.replace("crate", "crate::r")));

@@ -13,7 +13,7 @@ use crate::random::Random;
 use crate::web_server::{Answer, Request, WebServer};
 
 /// What a program with the feature `fault-injection` waits for a server, in milliseconds.
-const PATIENCE: &str = "2000";
+const TIMEOUT: &str = "2000";
 
 /// A hundredth of the area of the cloud.
 const HUNDREDTH: &str = "bounds = [500600.0, 4000600.0, 500840.0, 4000840.0]";
@@ -55,7 +55,7 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
 
 /// Returns a job on a file of the server.
 fn job_on(server: &WebServer, target: &str) -> Job {
-    Job::on(&[server.url(target)]).tiles_of(2000).variable("GDT_PATIENCE_MS", PATIENCE)
+    Job::on(&[server.url(target)]).tiles_of(2000).variable("GDT_TIMEOUT_MS", TIMEOUT)
 }
 
 /// Returns what must not depend on where a file is: the checksums of all results.
@@ -157,7 +157,7 @@ fn a_server_that_fails_for_ever_does_not_hold_a_job_up() {
     let run = |answer: Answer| -> Said {
         // The beginning comes, and then nothing more.
         server.answer(move |number, _| if number == 0 { Answer::Right } else { answer.clone() });
-        job_on(&server, "/a/cloud.las").variable("GDT_PATIENCE_MS", "400").run()
+        job_on(&server, "/a/cloud.las").variable("GDT_TIMEOUT_MS", "400").run()
     };
     let url = server.url("/a/cloud.las");
     run(Answer::Status(503, "X: y")).refused(1, &[&url, "bytes ", "503", "times in", "run again later"]);
@@ -172,7 +172,7 @@ fn a_server_that_fails_for_ever_does_not_hold_a_job_up() {
 fn what_no_server_can_hand_out_is_refused() {
     let server = WebServer::of(&files());
     let refused =
-        |url: &str, code, words: &[&str]| Job::on(&[url]).variable("GDT_PATIENCE_MS", "400").run().refused(code, words);
+        |url: &str, code, words: &[&str]| Job::on(&[url]).variable("GDT_TIMEOUT_MS", "400").run().refused(code, words);
     refused(&server.url("/none.laz"), 2, &["there is no file", "/none.laz", "404"]);
     refused(&server.url("/a/*.laz"), 2, &["[input] files", "name each one"]);
     refused("http://user:secret@127.0.0.1/a.laz", 2, &["a user and a password is refused"]);

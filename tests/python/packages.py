@@ -15,7 +15,9 @@ import yaml
 from lupa import LuaRuntime
 
 CARGO = tomllib.loads(Path("Cargo.toml").read_text())
-VERSION = CARGO["package"]["version"]
+# What all crates have in common is in the workspace.
+PACKAGE = {**CARGO["package"], **CARGO["workspace"]["package"]}
+VERSION = PACKAGE["version"]
 PACKAGING = Path("packaging")
 
 
@@ -23,14 +25,14 @@ def conda():
     recipe = yaml.safe_load((PACKAGING / "conda/recipe.yaml").read_text())
     assert recipe["context"]["version"] == VERSION, f"the recipe for conda is for {recipe['context']['version']}, not {VERSION}"
     assert (PACKAGING / "conda" / recipe["source"]["path"] / "Cargo.toml").is_file(), "the recipe's source is not the project"
-    assert recipe["about"]["license"] == CARGO["package"]["license"]
+    assert recipe["about"]["license"] == PACKAGE["license"]
 
 
 def wheel():
     project = tomllib.loads(Path("pyproject.toml").read_text())["project"]
     assert project["dynamic"] == ["version"] and "version" not in project, "the version of the wheel is not that of Cargo.toml"
     for key in ("name", "description", "license"):
-        assert project[key] == CARGO["package"][key], f"pyproject.toml has another {key} than Cargo.toml"
+        assert project[key] == PACKAGE[key], f"pyproject.toml has another {key} than Cargo.toml"
     assert all(Path(file).is_file() for file in project["license-files"] + [project["readme"]])
 
 

@@ -36,6 +36,7 @@ impl Lattice {
     }
 
     /// Returns the step along `axis` (0: x, 1: y, 2: z).
+    #[inline]
     pub fn step(&self, axis: usize) -> Decimal {
         if axis == 2 { self.resolution_z } else { self.resolution }
     }
@@ -123,6 +124,7 @@ impl AxisMap {
 
     /// Returns `mul` and `add` of a map that rounds nothing: the integer of a raw `i32` is `raw * mul + add`, which does not overflow an
     /// `i64`. Returns `None` for maps of very large numbers too.
+    #[inline]
     pub fn exact(&self) -> Option<[i64; 2]> {
         self.narrow.and_then(|[mul, add, div]| (div == 1).then_some([mul, add]))
     }

@@ -25,6 +25,7 @@ impl VertexDigest {
     }
 
     /// Returns the digest of two sets of vertices together.
+    #[inline]
     pub fn join(self, other: VertexDigest) -> VertexDigest {
         VertexDigest(self.0.wrapping_add(other.0))
     }

@@ -14,6 +14,7 @@ pub fn die() -> ! {
 }
 
 /// Marks a place where a test may kill the process.
+#[inline]
 pub fn point(name: &str) {
     mark(name);
     if is_due(name) {
@@ -22,6 +23,7 @@ pub fn point(name: &str) {
 }
 
 /// Marks a place that reads from a disk, or asks what is there, which a test may let fail as a broken disk does.
+#[inline]
 pub fn read(name: &str) -> io::Result<()> {
     if is_due(name) { Err(io::Error::from_raw_os_error(EIO)) } else { Ok(()) }
 }
@@ -81,10 +83,10 @@ mod injection {
         std::env::var("GDT_COMMIT_MS").ok()?.parse().ok().map(Duration::from_millis)
     }
 
-    /// Returns how long servers may be silent if a test sets it (`GDT_PATIENCE_MS`).
+    /// Returns how long servers may be silent if a test sets it (`GDT_TIMEOUT_MS`).
     #[cfg(feature = "remote")]
     pub fn network_timeout() -> Option<Duration> {
-        std::env::var("GDT_PATIENCE_MS").ok()?.parse().ok().map(Duration::from_millis)
+        std::env::var("GDT_TIMEOUT_MS").ok()?.parse().ok().map(Duration::from_millis)
     }
 
     /// Returns the number of processors if a test sets it (`GDT_PROCESSORS`).

@@ -69,6 +69,7 @@ fn is_ignored(signal: i32) -> bool {
 /// # Errors
 /// [`Error::Interrupted`] if the process was asked to stop.
 #[track_caller]
+#[inline]
 pub fn check() -> Result<()> {
     if is_wanted(Location::caller()) { Err(Error::Interrupted) } else { Ok(()) }
 }

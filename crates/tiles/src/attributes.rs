@@ -17,6 +17,7 @@ pub struct AttributeChoice {
 
 impl AttributeChoice {
     /// Returns whether vertices carry none.
+    #[inline]
     pub fn is_none(&self) -> bool {
         *self == AttributeChoice::default()
     }

@@ -18,6 +18,7 @@ pub struct HeightRange {
 
 impl HeightRange {
     /// Returns the heights of a box.
+    #[inline]
     pub fn of(bounds: Bounds<3>) -> HeightRange {
         HeightRange { low: bounds.min[2], high: bounds.max[2] }
     }
@@ -67,6 +68,7 @@ impl Coloring {
 }
 
 /// Returns the sRGB colour of an ASPRS classification.
+#[inline]
 pub fn class_color(class: u8) -> [u8; 3] {
     *CLASS_COLORS.get(class as usize).unwrap_or(&OTHER_CLASS)
 }

@@ -67,11 +67,13 @@ pub fn unit_normal(sum: NormalSum, frame: &Frame) -> [f32; 3] {
 }
 
 /// Returns `a + b`.
+#[inline]
 pub fn add(a: NormalSum, b: NormalSum) -> NormalSum {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// Returns the normal of the counterclockwise triangle `abc`, with a length of twice its area, in lattice steps.
+#[inline]
 pub fn cross(a: [i32; 3], b: [i32; 3], c: [i32; 3]) -> NormalSum {
     let difference = |p: [i32; 3]| [0, 1, 2].map(|k| p[k] as i128 - a[k] as i128);
     let ([ux, uy, uz], [vx, vy, vz]) = (difference(b), difference(c));

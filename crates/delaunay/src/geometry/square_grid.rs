@@ -26,11 +26,13 @@ impl SquareGrid {
     }
 
     /// Returns the number of cells.
+    #[inline]
     pub fn cells(&self) -> usize {
         self.columns * self.rows
     }
 
     /// Returns the number of cells in a row.
+    #[inline]
     pub fn columns(&self) -> usize {
         self.columns
     }

@@ -35,6 +35,7 @@ impl VertexAdjacency {
     }
 
     /// Returns the number of vertices, with and without triangles.
+    #[inline]
     pub fn vertices(&self) -> usize {
         self.starts.len() - 2
     }

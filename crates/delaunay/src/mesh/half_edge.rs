@@ -19,11 +19,13 @@ impl HalfEdgeMesh {
     }
 
     /// Returns all half-edges.
+    #[inline]
     pub fn half_edges(&self) -> impl Iterator<Item = HalfEdgeIndex> + use<> {
         (0..self.twins.len()).map(HalfEdgeIndex::new)
     }
 
     /// Returns the half-edges on the hull, ascending.
+    #[inline]
     pub fn hull(&self) -> impl Iterator<Item = HalfEdgeIndex> {
         // Few are: vector instructions tell which pieces have any.
         const PIECE: usize = 64;
@@ -69,6 +71,7 @@ impl HalfEdgeMesh {
 
     /// Returns the positions of the triangles around the origin of `h`, counterclockwise. If the origin lies on the hull, `h` must
     /// lie on the hull too.
+    #[inline]
     pub fn around(&self, h: HalfEdgeIndex) -> impl Iterator<Item = usize> {
         let turn = move |outgoing: &HalfEdgeIndex| {
             Some(self.twin(outgoing.previous())).filter(|&g| g != HalfEdgeIndex::HULL && g != h)

@@ -130,7 +130,7 @@ fn outside(
     ways: &mut ToDegrees,
     others: Option<&Others>,
 ) -> Option<Outside> {
-    let of = |said: SaidSystem| Outside::of(&said, ways.of(&said.crs)?, &said.own(places)?, others);
+    let of = |said: StatedSystem| Outside::of(&said, ways.of(&said.crs)?, &said.own(places)?, others);
     systems(source, common).into_iter().find_map(of)
 }
 
@@ -180,7 +180,7 @@ fn refuse_hopeless(outside: &[(&Source, Outside)], is_assumed: impl Fn(&Source) 
 }
 
 /// A system that the points of a source are in.
-struct SaidSystem {
+struct StatedSystem {
     crs: Crs,
     /// What the file is in.
     of_file: Crs,
@@ -190,7 +190,7 @@ struct SaidSystem {
     is_target: bool,
 }
 
-impl SaidSystem {
+impl StatedSystem {
     /// Returns the places in this system; `None` if it has none of them.
     fn own(&self, places: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
         let own: Vec<[f64; 2]> = match &self.to_file {
@@ -226,19 +226,24 @@ impl SaidSystem {
 }
 
 /// Returns what the file is in, if its points are transformed, and the system of the job.
-fn systems(source: &Source, common: &CommonPlace) -> Vec<SaidSystem> {
+fn systems(source: &Source, common: &CommonPlace) -> Vec<StatedSystem> {
     let crs = Crs { horizontal: Unit::from_metres(Some(common.metres)), ..common.crs.clone() };
     let ways = |from: &Crs| {
         let way = |from: &Crs, to: &Crs| CrsTransform::between(from, to, DatumRule::Close).ok();
         Some([way(&crs, from)?, way(from, &crs)?])
     };
     let Some(from) = source.transformed_from() else {
-        return vec![SaidSystem { of_file: crs.clone(), crs, to_file: None, is_target: false }];
+        return vec![StatedSystem { of_file: crs.clone(), crs, to_file: None, is_target: false }];
     };
     let Some(to_file) = ways(from) else { return Vec::new() };
     let of_file = from.clone();
     [(from.clone(), false), (crs.clone(), true)]
-        .map(|(crs, is_target)| SaidSystem { crs, of_file: of_file.clone(), to_file: Some(to_file.clone()), is_target })
+        .map(|(crs, is_target)| StatedSystem {
+            crs,
+            of_file: of_file.clone(),
+            to_file: Some(to_file.clone()),
+            is_target,
+        })
         .into()
 }
 
@@ -286,7 +291,7 @@ struct Outside {
 impl Outside {
     /// Returns how the nearest of some places lies outside the area of a system; `None` if it does not lie far outside.
     fn of(
-        said: &SaidSystem,
+        said: &StatedSystem,
         (area, way): &(AreaOfUse, CrsTransform),
         places: &[[f64; 2]],
         others: Option<&Others>,

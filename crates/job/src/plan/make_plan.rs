@@ -17,7 +17,7 @@ use crate::plan::job_plan::{HeaderClaims, Plan, PlannedInput, SkippedInput, deco
 use crate::plan::lattice_choice::{LatticeCoarsening, LatticeRequest, choose_lattice, fineness};
 use crate::plan::other_unit::{refuse_other_unit, warn_of_dropped_units};
 use crate::plan::stray_heights::JobHeights;
-use crate::plan::suspect_heights::check_doubtful_heights;
+use crate::plan::suspect_heights::check_suspect_heights;
 use crate::plan::text_inputs::{
     check_malformed_rows, check_malformed_sample, farthest_row, refuse_degrees, refuse_missing_classes,
     refuse_missing_returns, row_choice, wanted_fields,
@@ -188,7 +188,7 @@ fn try_plan(
     }
     check_malformed_sample(sources, &sample, &options.input)?;
     refuse_zero_points(sources, &extent, &sample, &lattice)?;
-    warnings.extend(check_doubtful_heights(sources, &sample, &lattice, options, metres_z)?);
+    warnings.extend(check_suspect_heights(sources, &sample, &lattice, options, metres_z)?);
     warnings.extend(flat_points(sources, &extent, &sample, &lattice));
     let heights = JobHeights {
         sources,

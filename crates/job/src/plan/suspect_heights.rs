@@ -23,7 +23,7 @@ struct Doubt {
 /// # Errors
 /// [`crate::Error::NoTerrain`] names the first such file, [`sys::Error::Io`] one that cannot be read. It is no bad file that a job may
 /// leave out: what the sample of all files has of one depends on the others, and so would the mesh.
-pub(crate) fn check_doubtful_heights(
+pub(crate) fn check_suspect_heights(
     sources: &[Source],
     sample: &HeightSample,
     lattice: &Lattice,

@@ -25,6 +25,7 @@ pub struct Point {
 impl Point {
     /// Returns a point of intensity 0. `order` is its number in the whole job, counting the records of all files in the order of the
     /// configuration, and must be below 2^40. It is 0 in jobs whose points are not numbered.
+    #[inline]
     pub fn new(position: [i32; 2], z: i32, rgb: [u16; 3], class: u8, order: u64) -> Point {
         let (order_high, order_low) = ((order >> 32) as u8, order as u32);
         Point { position, z, rgb, intensity: 0, class, order_high, unused: 0, order_low }
@@ -63,11 +64,13 @@ impl Point {
     }
 
     /// Returns the lattice integers x, y, z.
+    #[inline]
     pub fn corner(&self) -> [i32; 3] {
         [self.position[0], self.position[1], self.z]
     }
 
     /// Returns the number of this point's record in the whole job.
+    #[inline]
     pub fn order(&self) -> u64 {
         (self.order_high as u64) << 32 | self.order_low as u64
     }

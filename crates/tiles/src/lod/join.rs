@@ -168,6 +168,7 @@ impl Joined {
     }
 
     /// Returns the whole mesh, to be simplified.
+    #[inline]
     pub fn terrain(&self) -> Terrain<'_> {
         let near = NearBoundary { vertices: &self.on_border, triangles: &self.near_border };
         Terrain { positions: &self.positions, triangles: &self.triangles, may_be_on_boundary: Some(near) }

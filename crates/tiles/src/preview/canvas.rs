@@ -65,6 +65,7 @@ impl Canvas {
     }
 
     /// Returns the width and height in pixels.
+    #[inline]
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }

@@ -185,11 +185,13 @@ impl RasterGrid {
     }
 
     /// Returns the numbers of columns and rows.
+    #[inline]
     pub fn size(&self) -> [u32; 2] {
         self.size
     }
 
     /// Returns the number of cells.
+    #[inline]
     pub fn cells(&self) -> u64 {
         u64::from(self.size[0]) * u64::from(self.size[1])
     }

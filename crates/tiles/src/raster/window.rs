@@ -19,6 +19,7 @@ pub struct HeightScale {
 
 impl HeightScale {
     /// Returns a height of the lattice as a cell has it.
+    #[inline]
     pub fn source(self, lattice: f64) -> f32 {
         (self.offset + self.step * lattice) as f32
     }
@@ -65,6 +66,7 @@ impl<'a> Window<'a> {
     }
 
     /// Returns the columns and rows along its side.
+    #[inline]
     pub fn side(&self) -> usize {
         self.side
     }
