@@ -10,7 +10,7 @@
 pub mod durable;
 mod error;
 pub mod index;
-pub mod levels;
+pub(crate) mod levels;
 pub(crate) mod machine;
 pub mod merge_records;
 pub mod mesh;
@@ -20,11 +20,11 @@ pub mod phase;
 pub mod plan;
 pub mod preflight;
 pub mod progress;
-pub mod publish;
+pub(crate) mod publish;
 pub mod records;
 pub mod report;
 pub mod run;
-pub mod tiles;
+pub(crate) mod tiles;
 
 pub use crate::error::{Error, Result};
 

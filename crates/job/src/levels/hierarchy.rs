@@ -5,14 +5,14 @@ use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::partition::tree::{NodeKind, Tree};
 
 /// Bytes that a vertex takes while the meshes of a tile's children are joined and simplified.
-pub const BYTES_PER_LEVEL_VERTEX: u64 = 550;
+pub(crate) const BYTES_PER_LEVEL_VERTEX: u64 = 550;
 
 /// Bytes that the process takes, including what its allocator keeps from earlier steps.
 const KEPT: u64 = 104 << 20;
 
 /// A child of a coarser tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChildTile {
+pub(crate) enum ChildTile {
     /// An exact tile.
     Exact(TileIndex),
     /// The topmost tile of a part.
@@ -23,7 +23,7 @@ pub enum ChildTile {
 
 /// A coarser tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CoarseTile {
+pub(crate) struct CoarseTile {
     /// Its node of the tree.
     pub node: NodeIndex,
     /// The tiles that it is made from.
@@ -34,14 +34,14 @@ pub struct CoarseTile {
 
 /// The tiles of the tileset, or those of one part, or those above the parts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Hierarchy {
+pub(crate) struct Hierarchy {
     /// The coarser tiles. Children come before their parent, and the root is last. Empty if one tile holds everything.
     pub tiles: Vec<CoarseTile>,
 }
 
 /// How large coarser tiles are to be.
 #[derive(Clone, Copy, Debug)]
-pub struct LevelSizes {
+pub(crate) struct LevelSizes {
     /// The most sites in one, unless its children are so large that it would have less than a sixteenth of theirs.
     pub sites: u64,
     /// Bytes of memory that making all that are made at one time may take.
@@ -51,7 +51,7 @@ pub struct LevelSizes {
 impl LevelSizes {
     /// Returns the sizes for tiles of at most `sites` sites. They are smaller if five tiles do not fit the part of the job's `memory`
     /// that earlier steps leave free.
-    pub fn new(sites: u64, memory: u64) -> LevelSizes {
+    pub(crate) fn new(sites: u64, memory: u64) -> LevelSizes {
         let memory = memory.saturating_sub(KEPT).max(memory / 5).min(memory / 4 * 3);
         // Tiles have vertices on their borders besides their sites, so there is room for a fifth one.
         LevelSizes { sites: sites.min(memory / (5 * BYTES_PER_LEVEL_VERTEX)).max(1), memory }
@@ -59,19 +59,19 @@ impl LevelSizes {
 
     /// Returns about how many triangles a tile gets whose children together have `triangles`. Vertices along the borders come on top
     /// of them, so it is less than a quarter.
-    pub fn target(self, triangles: usize) -> usize {
+    pub(crate) fn target(self, triangles: usize) -> usize {
         (triangles / 16 * 3).min((2 * self.sites as usize).max(triangles / 16)).max(1)
     }
 }
 
 impl Hierarchy {
     /// Builds the hierarchy over `tree`; `points` is the number of points of every leaf, in their order.
-    pub fn new(tree: &Tree, points: &[u64], sizes: LevelSizes) -> Hierarchy {
+    pub(crate) fn new(tree: &Tree, points: &[u64], sizes: LevelSizes) -> Hierarchy {
         Hierarchy::over(tree, points, sizes, ChildTile::Exact)
     }
 
     /// Builds the hierarchy above the parts, whose numbers of points are `points`.
-    pub fn above_parts(tree: &Tree, points: &[u64], sizes: LevelSizes) -> Hierarchy {
+    pub(crate) fn above_parts(tree: &Tree, points: &[u64], sizes: LevelSizes) -> Hierarchy {
         Hierarchy::over(tree, points, sizes, |tile| ChildTile::Part(tile.part()))
     }
 
@@ -84,7 +84,7 @@ impl Hierarchy {
     }
 
     /// Returns the coarser tiles by height, lowest first: tiles of one height need only lower ones.
-    pub fn by_height(&self) -> Vec<Vec<usize>> {
+    pub(crate) fn by_height(&self) -> Vec<Vec<usize>> {
         let highest = self.tiles.iter().map(|tile| tile.height).max().unwrap_or(0);
         let at = |height: usize| (0..self.tiles.len()).filter(|&i| self.tiles[i].height == height).collect();
         (1..=highest).map(at).collect()

@@ -44,7 +44,7 @@ impl AddAssign for LevelStats {
 }
 
 /// Where the coarser tiles of a job are made.
-pub struct LevelContext<'a> {
+pub(crate) struct LevelContext<'a> {
     /// Holds the tiles, finer and coarser.
     pub directory: &'a JobDirectory,
     /// Holds what `tileset.json` says of them.
@@ -64,7 +64,7 @@ pub struct LevelContext<'a> {
 }
 
 /// Returns the topmost tile of a part.
-pub type TopOf<'a> = &'a (dyn Fn(PartIndex) -> Result<Child> + Sync);
+pub(crate) type TopOf<'a> = &'a (dyn Fn(PartIndex) -> Result<Child> + Sync);
 
 /// Spacings of a level in its error.
 const SPACINGS: f64 = 4.4;
@@ -86,7 +86,7 @@ fn seen_error(simple: &Simplified, frame: &Frame, bounds: Bounds<3>) -> f64 {
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the store, [`Error::Broken`] if a file is not what an earlier step wrote.
-pub fn make_level(context: &LevelContext, index: usize) -> Result<StepOutput<LevelStats>> {
+pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<StepOutput<LevelStats>> {
     let coarse = &context.hierarchy.tiles[index];
     let children = coarse.children.iter().map(|&child| Child::find(context, child)).collect::<Result<Vec<_>>>()?;
     let bounds = children.iter().filter_map(|child| child.own.bounds()).reduce(Bounds::union);
@@ -122,7 +122,7 @@ pub fn make_level(context: &LevelContext, index: usize) -> Result<StepOutput<Lev
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on the store.
-pub fn level_memory(context: &LevelContext, index: usize) -> Result<u64> {
+pub(crate) fn level_memory(context: &LevelContext, index: usize) -> Result<u64> {
     let children = context.hierarchy.tiles[index].children.iter().map(|&child| Child::find(context, child));
     let needed = memory_for(&children.collect::<Result<Vec<_>>>()?);
     Ok(needed.filter(|bytes| *bytes <= context.sizes.memory).unwrap_or(0))
@@ -160,7 +160,7 @@ fn contradiction(node: NodeIndex, what: &impl std::fmt::Display) -> Error {
 }
 
 /// A tile that a coarser one is made from.
-pub struct Child {
+pub(crate) struct Child {
     /// What `tileset.json` says of it.
     own: TileSummary,
     /// Whether it is an exact tile of the same part.
@@ -190,7 +190,7 @@ impl Child {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Broken`] on the part's store.
-    pub fn top(directory: &JobDirectory, store: &Store, tree: &Tree) -> Result<Child> {
+    pub(crate) fn top(directory: &JobDirectory, store: &Store, tree: &Tree) -> Result<Child> {
         let output = directory.output();
         let (own, path) = match tree.node(NodeIndex::ROOT).kind {
             NodeKind::Leaf(tile) => (TileSummary::load(store, tile)?, output.tile(tile.number())),

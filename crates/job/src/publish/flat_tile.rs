@@ -9,7 +9,7 @@ use tiles::gltf::read::read_tile;
 use tiles::lod::join::Joining;
 
 /// The way from the scene of the tiles to one that is the plane of the source.
-pub struct FlatScene<'a> {
+pub(crate) struct FlatScene<'a> {
     /// The frame of the tiles.
     pub bent: &'a Frame,
     /// The frame of the flat scene.
@@ -23,7 +23,7 @@ impl FlatScene<'_> {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] if the tile cannot be read or is damaged, [`Error::Config`] if a triangle is too long for f32.
-    pub fn tile(&self, path: &Path) -> Result<Vec<u8>> {
+    pub(crate) fn tile(&self, path: &Path) -> Result<Vec<u8>> {
         let file = read_tile(path)?;
         let mut joining = Joining::new(self.bent, file.parts.iter().map(|part| part.positions.len()).sum());
         joining.add(file).map_err(|what| Error::input(path, what.to_string()))?;

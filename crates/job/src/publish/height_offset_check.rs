@@ -12,7 +12,7 @@ use tiles::tiles3d::ground::Ground;
 ///
 /// # Errors
 /// [`sys::Error::Config`] if it does not; [`sys::Error::Io`] if a grid cannot be read.
-pub fn check_height_offset(plan: &Plan) -> Result<()> {
+pub(crate) fn check_height_offset(plan: &Plan) -> Result<()> {
     let Some(offset) = &plan.options.output.height_offset else { return Ok(()) };
     let geoid = Geoid::open(Some(offset))?;
     if offset.grid().is_none() {

@@ -1,9 +1,9 @@
 //! Step 8: writes what is beside the tiles.
 
-pub mod flat_tile;
-pub mod height_offset_check;
-pub mod one_file_limits;
-pub mod placement;
-pub mod raster;
-pub mod side_files;
-pub mod tileset_tree;
+pub(crate) mod flat_tile;
+pub(crate) mod height_offset_check;
+pub(crate) mod one_file_limits;
+pub(crate) mod placement;
+pub(crate) mod raster;
+pub(crate) mod side_files;
+pub(crate) mod tileset_tree;

@@ -4,17 +4,17 @@ use crate::progress::number_text::grouped;
 use crate::tiles::write_tile::TileStats;
 
 /// Viewers do not open a single file with more triangles.
-pub const MAX_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
+pub(crate) const MAX_TRIANGLES_IN_ONE_FILE: u64 = 20_000_000;
 /// Each tile is a node with a mesh of its own: with more of them their description would fill the memory.
 const MAX_TILES_IN_ONE_FILE: u64 = 4096;
 
 /// Tells whether `terrain.glb` can hold all tiles.
-pub fn fits_one_file(written: &TileStats) -> bool {
+pub(crate) fn fits_one_file(written: &TileStats) -> bool {
     written.triangles <= MAX_TRIANGLES_IN_ONE_FILE && written.files <= MAX_TILES_IN_ONE_FILE
 }
 
 /// Returns the warning for a terrain that does not fit the one file that the user wants.
-pub fn too_large_for_one_file(written: &TileStats) -> String {
+pub(crate) fn too_large_for_one_file(written: &TileStats) -> String {
     format!(
         "{} triangles in {} tiles are more than viewers open as one file: tileset.json is written instead of terrain.glb; set {}",
         grouped(written.triangles),

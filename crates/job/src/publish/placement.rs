@@ -15,7 +15,7 @@ use tiles::tiles3d::tileset::TilesetNode;
 
 /// What `georeference.json` says of the globe.
 #[derive(Clone, Debug, Serialize)]
-pub struct Placement {
+pub(crate) struct Placement {
     /// The projected system as a PROJ.4 string.
     pub definition: String,
     /// The transform of the tileset's root: metres east, north and up in the scene to earth-centred ones, column by column.
@@ -42,7 +42,7 @@ const ADDED_TWICE: &str = "the inputs say that heights count from the ellipsoid,
 ///
 /// # Errors
 /// [`NotPlaced`] says why the terrain cannot be placed; then nothing is.
-pub fn place(crs: &Crs, frame: &Frame, geoid: Geoid, root: &mut TilesetNode) -> Result<Placement, NotPlaced> {
+pub(crate) fn place(crs: &Crs, frame: &Frame, geoid: Geoid, root: &mut TilesetNode) -> Result<Placement, NotPlaced> {
     let extras = frame.extras();
     let system = globe_system(crs, extras.metres_per_unit)?;
     let definition = system.definition.clone();
@@ -104,7 +104,7 @@ fn lay(ground: &Ground, node: &mut TilesetNode) -> Result<f64, NotPlaced> {
 }
 
 /// Returns what the user should know about the placement.
-pub fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Option<String> {
+pub(crate) fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Option<String> {
     let placement = match placement {
         Err(why) => {
             return Some(format!("tileset.json is not placed on the globe: {why}; its coordinates are local"));
@@ -135,7 +135,7 @@ pub fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Option<Str
 }
 
 /// Returns what the user should know about the heights of a terrain on the globe, to which `offset` is added.
-pub fn heights_warning(crs: &Crs, offset: Option<&HeightOffset>) -> Option<String> {
+pub(crate) fn heights_warning(crs: &Crs, offset: Option<&HeightOffset>) -> Option<String> {
     let from = match &crs.vertical_system {
         _ if crs.has_ellipsoidal_heights() => {
             return offset.filter(|offset| offset.is_model()).map(|_| ADDED_TWICE.into());

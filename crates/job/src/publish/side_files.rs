@@ -24,7 +24,7 @@ use tiles::preview::picture::Picture;
 use tiles::tiles3d::tileset::{TilesetNode, write_tilesets};
 
 /// What the files beside the tiles hold.
-pub struct SideFiles<'a> {
+pub(crate) struct SideFiles<'a> {
     /// The text of `georeference.json`.
     pub georeference: String,
     /// The map of all tiles, and the root of the tileset, if there is to be one.
@@ -48,7 +48,7 @@ pub struct SideFiles<'a> {
 /// # Errors
 /// [`sys::Error::Io`] on the output or the store, [`sys::Error::Broken`] if they are not what earlier steps wrote,
 /// [`sys::Error::Config`] if there is to be a page and it is not built in.
-pub fn write_side_files(
+pub(crate) fn write_side_files(
     directory: &JobDirectory,
     content: &SideFiles,
     canvas: &Canvas,
@@ -108,7 +108,7 @@ fn pending_tilesets(
 }
 
 /// All tiles of a job.
-pub trait EachTile: Sync {
+pub(crate) trait EachTile: Sync {
     /// Calls `visit` with each tile, in their order, and the store that has its records.
     ///
     /// # Errors
@@ -117,7 +117,7 @@ pub trait EachTile: Sync {
 }
 
 /// The tiles of one part.
-pub struct StoredTiles<'a> {
+pub(crate) struct StoredTiles<'a> {
     /// Has their records.
     pub store: &'a Store,
     /// The tree whose leaves they are.

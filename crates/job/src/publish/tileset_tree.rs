@@ -10,7 +10,7 @@ use tiles::file_names::{level_uri, tile_uri};
 use tiles::tiles3d::tileset::TilesetNode;
 
 /// The tiles over one tree, and what is known of them.
-pub struct TilesOfTree<'a> {
+pub(crate) struct TilesOfTree<'a> {
     /// Has what the steps stored.
     pub store: &'a Store,
     /// The tree.
@@ -26,7 +26,7 @@ impl TilesOfTree<'_> {
     ///
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store.
-    pub fn root(&self) -> Result<Option<TilesetNode>> {
+    pub(crate) fn root(&self) -> Result<Option<TilesetNode>> {
         if let Some(last) = self.hierarchy.tiles.len().checked_sub(1) {
             return self.coarse_node(last);
         }

@@ -18,7 +18,7 @@ use tiles::normals::NormalSum;
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on the store.
-pub fn finish_border_normals(
+pub(crate) fn finish_border_normals(
     store: &Store,
     tree: &Tree,
     style: &TileStyle,
@@ -33,7 +33,7 @@ pub fn finish_border_normals(
 ///
 /// # Errors
 /// As [`finish_border_normals`].
-pub fn finished_border(
+pub(crate) fn finished_border(
     store: &Store,
     tree: &Tree,
     style: &TileStyle,

@@ -14,14 +14,14 @@ use tiles::tiles3d::ground::Ground;
 
 /// The greatest distortion in metres with which one transform places all tiles of a scene that is not bent. Datums that differ from the
 /// globe's by as much are accepted too.
-pub const ONE_TRANSFORM: f64 = 1.0;
+pub(crate) const ONE_TRANSFORM: f64 = 1.0;
 
 /// The same for a scene that is bent upwards alone. All that is left is sideways: at the ends of 24 km in the Alps, or at the edge of a UTM
 /// zone, some metres. With one transform tiles meet exactly, which is worth more than these.
-pub const ONE_TRANSFORM_SIDEWAYS: f64 = 5.0;
+pub(crate) const ONE_TRANSFORM_SIDEWAYS: f64 = 5.0;
 
 /// Tells whether the scene of a job may be bent, if the terrain is wide.
-pub fn may_be_bent(plan: &Plan) -> bool {
+pub(crate) fn may_be_bent(plan: &Plan) -> bool {
     bendable(plan).is_some()
 }
 
@@ -36,7 +36,7 @@ fn bendable(plan: &Plan) -> Option<GlobeSystem> {
 ///
 /// # Errors
 /// [`sys::Error::Config`] if the geoid has no height anywhere, or its file is damaged; [`sys::Error::Io`] if it cannot be read.
-pub fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> sys::Result<Option<Curvature>> {
+pub(crate) fn curvature_of(plan: &Plan, bounds: Bounds<3>) -> sys::Result<Option<Curvature>> {
     let Some(system) = bendable(plan) else { return Ok(None) };
     let (output, extras) = (&plan.options.output, plan.frame.extras());
     let geoid = Geoid::open(output.height_offset.as_ref())?;

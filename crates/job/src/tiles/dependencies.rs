@@ -8,7 +8,7 @@ use crate::index::{NodeIndex, TileIndex};
 
 /// A tile whose triangles are all known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FinishedTile {
+pub(crate) struct FinishedTile {
     /// The tile.
     pub tile: TileIndex,
     /// A merged node above which no seam touches the tile.
@@ -16,7 +16,7 @@ pub struct FinishedTile {
 }
 
 /// Which tiles wait for which.
-pub struct TileDependencies {
+pub(crate) struct TileDependencies {
     /// The tiles whose border normals are done.
     done: Vec<Option<FinishedTile>>,
     /// The number of neighbours that each of them still waits for.
@@ -27,13 +27,13 @@ pub struct TileDependencies {
 
 impl TileDependencies {
     /// Returns the state for this number of tiles, none of them done.
-    pub fn new(tiles: usize) -> TileDependencies {
+    pub(crate) fn new(tiles: usize) -> TileDependencies {
         TileDependencies { done: vec![None; tiles], missing: vec![0; tiles], waiting: vec![Vec::new(); tiles] }
     }
 
     /// Notes that the border normals of a tile are done. Its own triangles have corners in the tiles `neighbours`, which names each
     /// once. Returns the tiles that can be written now.
-    pub fn border_done(&mut self, finished: FinishedTile, neighbours: &[TileIndex]) -> Vec<FinishedTile> {
+    pub(crate) fn border_done(&mut self, finished: FinishedTile, neighbours: &[TileIndex]) -> Vec<FinishedTile> {
         let tile = finished.tile.get();
         self.done[tile] = Some(finished);
         for neighbour in neighbours.iter().map(|neighbour| neighbour.get()) {

@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 
 /// The edges over which a triangle that touches the tile flows out of the hull.
 #[derive(Debug, Default)]
-pub struct HullSlivers {
+pub(crate) struct HullSlivers {
     /// `None` if all triangles stay.
     rule: Option<HullRule>,
     edges: HashSet<[Site; 2]>,
@@ -18,7 +18,7 @@ pub struct HullSlivers {
 
 impl HullSlivers {
     /// Returns the slivers of a tile from whose edges `trimmed` ways lead out of the hull; none without a `rule`.
-    pub fn new(rule: Option<HullRule>, trimmed: &[[Site; 2]]) -> HullSlivers {
+    pub(crate) fn new(rule: Option<HullRule>, trimmed: &[[Site; 2]]) -> HullSlivers {
         match rule {
             Some(_) if !trimmed.is_empty() => HullSlivers { rule, edges: trimmed.iter().copied().collect() },
             _ => HullSlivers::default(),
@@ -26,19 +26,19 @@ impl HullSlivers {
     }
 
     /// Tells whether no triangle of the tile is a sliver.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.rule.is_none()
     }
 
     /// Tells whether a triangle of the tile's seam is a sliver.
-    pub fn has(&self, triangle: &SeamTriangle) -> bool {
+    pub(crate) fn has(&self, triangle: &SeamTriangle) -> bool {
         self.rule
             .and_then(|rule| flow(rule, triangle.map(|corner| corner.plane())))
             .is_some_and(|edge| self.edges.contains(&edge))
     }
 
     /// Removes the slivers from the `triangles` that the tile's leaf has made final, and returns them. Both stay in order.
-    pub fn take(&self, positions: &[[i32; 3]], triangles: &mut Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    pub(crate) fn take(&self, positions: &[[i32; 3]], triangles: &mut Vec<[u32; 3]>) -> Vec<[u32; 3]> {
         let Some(rule) = self.rule else { return Vec::new() };
         let corners = |t: &[u32; 3]| t.map(|v| [positions[v as usize][0], positions[v as usize][1]]);
         let flows = triangles.iter().enumerate().filter_map(|(at, t)| Some((flow(rule, corners(t))?, at)));

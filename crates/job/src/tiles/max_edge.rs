@@ -20,11 +20,11 @@ const SITES_PER_CELL: u128 = 256;
 const MAX_CELLS: u64 = 1 << 22;
 
 /// Calls a function with the position of every site, on any thread and in any order.
-pub type VisitSites<'a> = &'a dyn Fn(&(dyn Fn(&[i32; 3]) + Sync)) -> Result<()>;
+pub(crate) type VisitSites<'a> = &'a dyn Fn(&(dyn Fn(&[i32; 3]) + Sync)) -> Result<()>;
 
 /// The rule that leaves triangles out.
 #[derive(Debug, Default)]
-pub enum MaxEdgeRule {
+pub(crate) enum MaxEdgeRule {
     /// It keeps all.
     #[default]
     KeepAll,
@@ -39,7 +39,7 @@ impl MaxEdgeRule {
     ///
     /// # Errors
     /// Those of `visit_sites`.
-    pub fn new(
+    pub(crate) fn new(
         choice: MaxEdge,
         frame: &Frame,
         sites: u64,
@@ -61,7 +61,7 @@ impl MaxEdgeRule {
     ///
     /// # Errors
     /// [`Error::Broken`] if they are those of another job.
-    pub fn of_counts(sites: u64, bounds: Bounds<3>, counts: Vec<u32>) -> Result<MaxEdgeRule> {
+    pub(crate) fn of_counts(sites: u64, bounds: Bounds<3>, counts: Vec<u32>) -> Result<MaxEdgeRule> {
         let empty = SiteSpacing::empty(bounds, sites);
         match counts.len() == empty.counts.len() {
             true => Ok(MaxEdgeRule::Spacing(SiteSpacing { counts, ..empty })),
@@ -70,7 +70,7 @@ impl MaxEdgeRule {
     }
 
     /// Returns what [`MaxEdgeRule::of_counts`] takes. A rule that looks at no sites has none.
-    pub fn counts(&self) -> &[u32] {
+    pub(crate) fn counts(&self) -> &[u32] {
         match self {
             MaxEdgeRule::Spacing(spacing) => &spacing.counts,
             MaxEdgeRule::KeepAll | MaxEdgeRule::Length(_) => &[],
@@ -78,13 +78,13 @@ impl MaxEdgeRule {
     }
 
     /// Tells whether the rule leaves out nothing at all.
-    pub fn keeps_all(&self) -> bool {
+    pub(crate) fn keeps_all(&self) -> bool {
         matches!(self, MaxEdgeRule::KeepAll)
     }
 
     /// Tells whether the triangle with these corners is left out. Heights do not count.
     #[inline]
-    pub fn leaves_out(&self, corners: [[i32; 3]; 3]) -> bool {
+    pub(crate) fn leaves_out(&self, corners: [[i32; 3]; 3]) -> bool {
         match self {
             MaxEdgeRule::KeepAll => false,
             MaxEdgeRule::Length(limit) => longest_square(corners) > *limit,
@@ -107,7 +107,7 @@ fn longest_square([a, b, c]: [[i32; 3]; 3]) -> u64 {
 /// root of the cell's area divided by n. A cell at the edge of a void has few sites because most of it is void, so each cell takes
 /// the count of the fullest of itself and its neighbours.
 #[derive(Debug)]
-pub struct SiteSpacing {
+pub(crate) struct SiteSpacing {
     grid: SquareGrid,
     /// The side of a cell in lattice steps.
     side: i64,

@@ -10,7 +10,7 @@ use sys::Result;
 ///
 /// # Errors
 /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store.
-pub fn seam_of(store: &Store, tree: &Tree, finished: FinishedTile) -> Result<SeamOfTile> {
+pub(crate) fn seam_of(store: &Store, tree: &Tree, finished: FinishedTile) -> Result<SeamOfTile> {
     let FinishedTile { tile, last_merge } = finished;
     let (leaf, mut seam) = (tree.leaf(tile), SeamOfTile::default());
     if store.has(StepRecord::Seam(leaf)) {

@@ -17,7 +17,7 @@ use tiles::options::{ColorChoice, Hull, OutputOptions};
 
 /// How tiles look.
 #[derive(Debug)]
-pub struct TileStyle {
+pub(crate) struct TileStyle {
     /// Where lattice integers lie in a glTF scene.
     pub frame: Frame,
     /// Where colours come from; `None` for no colours.
@@ -67,7 +67,7 @@ impl TileStyle {
     ///
     /// # Errors
     /// Those of [`Plan::built_breaklines`].
-    pub fn new(
+    pub(crate) fn new(
         plan: &Plan,
         max_rgb: u16,
         bounds: Bounds<3>,
@@ -97,14 +97,14 @@ impl TileStyle {
     /// Tells whether the triangle with these corners is left out because it is long. A lake has no points, and a river often has none, so
     /// the triangles of their water are long.
     #[inline]
-    pub fn leaves_out(&self, corners: [[i32; 3]; 3]) -> bool {
+    pub(crate) fn leaves_out(&self, corners: [[i32; 3]; 3]) -> bool {
         let places = corners.map(|[x, y, _]| [x, y]);
         let is_water = |lines: &Arc<Breaklines>| lines.is_water(places) || lines.is_between_shores(places);
         self.max_edge.leaves_out(corners) && !self.lines.as_ref().is_some_and(is_water)
     }
 
     /// Removes the triangles that are left out because they are long from `triangles` and returns them. Both stay in order.
-    pub fn take_long(&self, positions: &[[i32; 3]], triangles: &mut Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    pub(crate) fn take_long(&self, positions: &[[i32; 3]], triangles: &mut Vec<[u32; 3]>) -> Vec<[u32; 3]> {
         if self.max_edge.keeps_all() {
             return Vec::new();
         }
@@ -114,7 +114,7 @@ impl TileStyle {
     }
 
     /// Returns the frame of these tiles in a scene that is not bent. The points of the job are within `bounds`.
-    pub fn flat_frame(&self, plan: &Plan, bounds: Bounds<3>) -> Frame {
+    pub(crate) fn flat_frame(&self, plan: &Plan, bounds: Bounds<3>) -> Frame {
         with_steps(plan.frame.clone(), self.compression, bounds)
     }
 }

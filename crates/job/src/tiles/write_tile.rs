@@ -52,7 +52,7 @@ impl AddAssign for TileStats {
 ///
 /// # Errors
 /// [`sys::Error::Io`] on the output or the store, [`sys::Error::Config`] if a triangle is too long for f32.
-pub fn write_tile(
+pub(crate) fn write_tile(
     directory: &JobDirectory,
     store: &Store,
     style: &TileStyle,
@@ -102,7 +102,7 @@ thread_local! {
 ///
 /// # Errors
 /// [`sys::Error::Io`] if writing fails, [`sys::Error::Config`] if a triangle is too long for f32.
-pub fn write_glb(path: &Path, content: &Tile, style: &TileStyle) -> Result<PendingFile> {
+pub(crate) fn write_glb(path: &Path, content: &Tile, style: &TileStyle) -> Result<PendingFile> {
     create_folder_of(path)?;
     GLB.with_borrow_mut(|glb| {
         glb.encode(&style.frame, content, style.compression, style.copyright.as_deref())?;

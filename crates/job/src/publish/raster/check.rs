@@ -26,7 +26,7 @@ pub(crate) fn grid_over(plan: &Plan, options: &RasterOptions, bounds: Bounds<2>)
 ///
 /// # Errors
 /// [`Error::Config`] if it does not.
-pub fn check_raster(plan: &Plan) -> Result<Option<RasterGrid>> {
+pub(crate) fn check_raster(plan: &Plan) -> Result<Option<RasterGrid>> {
     let Some(options) = &plan.options.output.raster else { return Ok(None) };
     match (grid_over(plan, options, plan.extent), &plan.stretch) {
         (Err(Error::Config(what)), Some(stretch)) => Err(Error::Config(format!("{what}; {stretch}"))),

@@ -8,11 +8,11 @@
 //! a tile of few points may have thousands of millions of cells, and another raster would take all tiles to be written again. Reading
 //! the tiles takes about a third of the time of the raster.
 
-pub mod check;
+pub(crate) mod check;
 pub(crate) mod system;
 pub(crate) mod tile_meshes;
 pub(crate) mod waiting_blocks;
-pub mod write_raster;
+pub(crate) mod write_raster;
 
 mod nodata_heights;
 mod pyramid;

@@ -67,7 +67,7 @@ struct RasterPart {
 }
 
 /// A raster that is to be written.
-pub struct RasterWork<'a> {
+pub(crate) struct RasterWork<'a> {
     plan: &'a Plan,
     options: RasterOptions,
     frame: &'a Frame,
@@ -82,7 +82,7 @@ impl<'a> RasterWork<'a> {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Broken`] on a store, [`Error::Config`] if there are too many cells.
-    pub fn of(plan: &'a Plan, frame: &'a Frame, tiles: &dyn EachTile) -> Result<Option<RasterWork<'a>>> {
+    pub(crate) fn of(plan: &'a Plan, frame: &'a Frame, tiles: &dyn EachTile) -> Result<Option<RasterWork<'a>>> {
         let Some(options) = plan.options.output.raster else { return Ok(None) };
         let boxes = boxes(tiles)?;
         let all = boxes.iter().map(|tile| tile.bounds).reduce(Bounds::union);
@@ -97,7 +97,7 @@ impl<'a> RasterWork<'a> {
     }
 
     /// Returns the number of blocks of the raster itself.
-    pub fn blocks(&self) -> u64 {
+    pub(crate) fn blocks(&self) -> u64 {
         let of_part =
             |part: &RasterPart| blocks(part.grid.size()).into_iter().map(|count| count as u64).product::<u64>();
         self.parts().iter().map(of_part).sum()
@@ -115,7 +115,7 @@ impl<'a> RasterWork<'a> {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] on a file, [`Error::Interrupted`].
-    pub fn write(&self, directory: &JobDirectory, done: &(dyn Fn() + Sync)) -> Result<StepOutput<RasterStats>> {
+    pub(crate) fn write(&self, directory: &JobDirectory, done: &(dyn Fn() + Sync)) -> Result<StepOutput<RasterStats>> {
         let mut stats = RasterStats { size: self.grid.size(), ..RasterStats::default() };
         let (mut files, mut listed) = (Vec::new(), Vec::new());
         for part in self.parts() {
@@ -224,7 +224,7 @@ impl<'a> RasterWork<'a> {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] on a tile, [`Error::Interrupted`].
-    pub fn warnings(&self, directory: &JobDirectory, stats: &RasterStats) -> Result<Vec<String>> {
+    pub(crate) fn warnings(&self, directory: &JobDirectory, stats: &RasterStats) -> Result<Vec<String>> {
         let file = if self.options.cells_per_file.is_some() { "terrain.vrt" } else { "terrain.tif" };
         let nodata = self.options.nodata;
         let mut warnings = Vec::new();
