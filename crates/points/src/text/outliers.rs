@@ -97,7 +97,7 @@ impl Middle {
     }
 }
 
-/// Returns the box outside which a row is an outlier, given the box of the [middle] of the rows; `None` if that is a point. One of x
+/// Returns the box outside which a row is an outlier, given the box of the middle of the rows; `None` if that is a point. One of x
 /// and y is as long as so many `steps` of z: 1 for lengths, and for degrees their length on the ground.
 pub fn plausible_box(middle: &RowBox, steps: f64) -> Option<RowBox> {
     // A strip or a plane is narrow on one axis, which says nothing about how far its rows may lie apart there.
