@@ -210,15 +210,19 @@ fn units_that_are_not_known_are_named() {
         ("x [rod];y [rod];z [rod]", "\"rod\""),
         ("x (local);y (local);z", "\"local\""),
         ("X [Easting (rod)];Y [Northing (rod)];z", "\"rod\""),
-        ("x [m];y [m];Z (m.s.l.)", "\"m.s.l.\""),
+        ("x [m];y [m];Z (local)", "\"local\""),
     ] {
         let cloud = assert_two_points(&format!("{header}\n1.5;2;3.25\n4;5;6\n"));
         let warning = first_warning(&cloud);
         assert!(warning.contains(unknown) && warning.contains("no unit that is known"), "{header}: {warning:?}");
     }
-    for header in
-        ["x [yd];y [yd];z [yd]", "x (survey feet);y (survey feet);z (m ü. NN)", "x [Mètres];y [Mètres];z (Höhe)"]
-    {
+    for header in [
+        "x [yd];y [yd];z [yd]",
+        "x (survey feet);y (survey feet);z (m ü. NN)",
+        "x [Mètres];y [Mètres];z (Höhe)",
+        "x [m];y [m];Z (m.s.l.)",
+        "x [m];y [m];z (AHD)",
+    ] {
         let cloud = assert_two_points(&format!("{header}\n1.5;2;3.25\n4;5;6\n"));
         assert!(cloud.source.crs.horizontal != Unit::Unknown && first_warning(&cloud).is_empty(), "{header}");
     }
