@@ -98,11 +98,11 @@ pub(crate) fn named_columns<'a>(
         let best = names.iter().filter_map(Name::role).filter(|found| found.1 == role).map(|found| found.0).min();
         let same = |name: &Name| best.is_some() && name.role() == best.map(|rank| (rank, role));
         match (names.iter().filter(|name| same(name)).count(), role) {
-            (0, ColumnRole::Coordinate(_)) => return Err(NamesError::Missing(known[0])),
+            (0, ColumnRole::Coordinate(_)) => return Err(NamesError::Missing(known[0][0])),
             (0, _) => continue,
             // Most jobs read none of these. Two of them are no reason to refuse the file, and the first is taken.
             (1, _) | (_, ColumnRole::Intensity | ColumnRole::ReturnNumber | ColumnRole::Returns) => {}
-            (count, _) => return Err(NamesError::Repeated { count, name: known[0] }),
+            (count, _) => return Err(NamesError::Repeated { count, name: known[0][0] }),
         }
         let place = names.iter().position(same);
         if let (ColumnRole::Coordinate(axis), Some(place)) = (role, place) {
