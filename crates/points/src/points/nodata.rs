@@ -1,7 +1,8 @@
 //! Heights that stand for "nothing measured" (nodata), such as -9999 in a grid that was written as points. They are told from heights by
 //! their number, and by their distance from all heights.
 
-use serde::{Deserialize, Serialize};
+use crate::points::extremes::{Extremes, Lowest, SharedHeight};
+use crate::points::nodata_number::{NO_HEIGHT, is_number_in_steps, is_usual_number, stands_for_nodata_alone};
 
 /// The fewest units between a number that stands for nodata and the nearest height.
 const FAR: f64 = 100.0;
@@ -40,9 +41,6 @@ const SHARE: u64 = 10;
 const TOWER: f64 = 150.0;
 const TIMES_OF_TOWER: f64 = 2.0;
 
-/// Numbers that some programs write for nodata, and that may be heights.
-const USUAL_NUMBERS: [f64; 7] = [0.0, -1.0, -99.0, 255.0, 999.0, 65535.0, 1e6];
-
 /// Heights within so many units of a value are next to it, unless their own range is smaller.
 const NEXT: f64 = 5.0;
 
@@ -56,61 +54,11 @@ const FEW: [u64; 2] = [3, 5];
 /// Heights of fewer values do not vary, so the distance of another one from them shows nothing.
 const LEAST_VALUES: usize = 5;
 
-/// How many of the lowest and of the highest values are kept.
-const KEPT: usize = 12;
-
 /// So many records beside a value, below it and above, may be noise that joins it to nothing.
 const STRAYS: u64 = 2;
 
 /// What is among so many records is no noise, but a shore, if fewer than this many times as many share the value.
 const TIMES_STRAYS: u64 = 10;
-
-/// No height is as large, whatever its unit.
-pub(crate) const NO_HEIGHT: f64 = 1e18;
-
-/// The greatest numbers of single and of double precision, half of the first, and the fill value of NetCDF. Programs write them with more or
-/// fewer digits.
-const HUGE_NUMBERS: [f64; 4] = [f32::MAX as f64, f64::MAX, 1.701_411_834_6e38, 9.969_209_968_386_869e36];
-
-/// The ends of 16 and of 32 bits, and those that some programs keep for nodata beside them.
-const ENDS_OF_INTEGERS: [f64; 6] = [-32768.0, -32767.0, 32767.0, -2_147_483_648.0, -2_147_483_647.0, 2_147_483_647.0];
-
-/// Returns whether programs write `value` for nodata: nines alone, the end of a kind of number, or a great power of ten.
-pub(crate) fn is_nodata_number(value: f64) -> bool {
-    let least_digits = if value < 0.0 { 3 } else { 4 };
-    let is_nines = || (least_digits..=15).any(|digits| value.abs() == power_of_ten(digits) - 1.0);
-    let is_end = || HUGE_NUMBERS.into_iter().any(|end| (value.abs() / end - 1.0).abs() < 1e-4);
-    ENDS_OF_INTEGERS.contains(&value) || is_nines() || is_great_power_of_ten(value.abs()) || is_end()
-}
-
-/// Returns whether some programs write `value` for nodata, though it may be a height.
-fn is_usual_number(value: f64) -> bool {
-    USUAL_NUMBERS.contains(&value) || is_nodata_number(value)
-}
-
-fn is_great_power_of_ten(value: f64) -> bool {
-    let power = value.log10().round();
-    value >= 0.999e9 && (value / 10_f64.powf(power) - 1.0).abs() < 1e-9
-}
-
-fn power_of_ten(power: u32) -> f64 {
-    10_i64.checked_pow(power).map_or(f64::INFINITY, |power| power as f64)
-}
-
-/// Returns whether a value that programs write for nodata is none without other heights to compare it with.
-fn stands_for_nodata_alone(value: f64) -> bool {
-    value <= -9999.0 || value.abs() >= power_of_ten(9)
-}
-
-/// A height and who has it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SharedHeight {
-    pub value: f64,
-    /// How many records have it.
-    pub(crate) count: u64,
-    /// The number of the first of them, or of its line.
-    pub(crate) first: u64,
-}
 
 impl SharedHeight {
     /// Returns whether few of all `records` have this value, and it lies at least `least` below `others`, much farther than these lie from each
@@ -130,49 +78,6 @@ impl SharedHeight {
         self.count >= LEAST_RECORDS
             && gap >= STEPS * steps.fold(f64::INFINITY, f64::min)
             && (is_wide(USUAL_GAP, TIMES_OF_USUAL, high - low) || is_wide(EMPTY_GAP, TIMES_OF_NEAREST, spread))
-    }
-}
-
-/// The lowest and the highest values of heights, and how many records have each.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Extremes {
-    lowest: Lowest,
-    /// With the other sign.
-    highest: Lowest,
-}
-
-/// The lowest values, ascending.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Lowest(Vec<SharedHeight>);
-
-impl Lowest {
-    #[inline(always)]
-    fn see(&mut self, height: SharedHeight) {
-        let is_higher = |last: &SharedHeight| self.0.len() == KEPT && height.value > last.value;
-        if !self.0.last().is_some_and(is_higher) {
-            self.insert(height);
-        }
-    }
-
-    #[inline(never)]
-    fn insert(&mut self, height: SharedHeight) {
-        match self.0.binary_search_by(|known| known.value.total_cmp(&height.value)) {
-            Ok(at) => {
-                let known = &mut self.0[at];
-                known.count = known.count.saturating_add(height.count);
-                known.first = known.first.min(height.first);
-            }
-            Err(at) => {
-                self.0.insert(at, height);
-                self.0.truncate(KEPT);
-            }
-        }
-    }
-
-    /// Returns the heights that are not numbers for nodata; `None` if there is none.
-    fn rest(&self, is_number: impl Fn(f64) -> bool) -> Option<Vec<SharedHeight>> {
-        let rest: Vec<SharedHeight> = self.0.iter().filter(|height| !is_number(height.value)).copied().collect();
-        (!rest.is_empty()).then_some(rest)
     }
 }
 
@@ -202,43 +107,6 @@ pub struct FoundNodata {
 }
 
 impl Extremes {
-    /// Takes the height of record or line `number`.
-    #[inline(always)]
-    pub fn see(&mut self, value: f64, number: u64) {
-        self.see_shared(SharedHeight { value, count: 1, first: number });
-    }
-
-    #[inline(always)]
-    fn see_shared(&mut self, height: SharedHeight) {
-        // -0 is 0.
-        self.lowest.see(SharedHeight { value: height.value + 0.0, ..height });
-        self.highest.see(SharedHeight { value: 0.0 - height.value, ..height });
-    }
-
-    /// Takes the heights of the records after these, whose numbers are counted from `before`.
-    pub(crate) fn add(&mut self, other: &Extremes, before: u64) {
-        let moved = |height: &SharedHeight| SharedHeight { first: height.first.saturating_add(before), ..*height };
-        other.lowest.0.iter().for_each(|height| self.lowest.see(moved(height)));
-        other.highest.0.iter().for_each(|height| self.highest.see(moved(height)));
-    }
-
-    /// Returns these heights with numbers that count from `before`.
-    pub(crate) fn after(&self, before: u64) -> Extremes {
-        let mut moved = Extremes::default();
-        moved.add(self, before);
-        moved
-    }
-
-    /// Returns these heights in other units.
-    pub fn map(&self, to: impl Fn(f64) -> f64) -> Extremes {
-        let map = |lowest: &Lowest, sign: f64| {
-            let moved =
-                lowest.0.iter().map(|height| SharedHeight { value: sign * to(sign * height.value) + 0.0, ..*height });
-            Lowest(moved.collect())
-        };
-        Extremes { lowest: map(&self.lowest, 1.0), highest: map(&self.highest, -1.0) }
-    }
-
     /// Returns the heights that stand for nodata: those for which `is_number` holds, and which lie farther from all others than these
     /// from each other, or much farther than the nearest of them do.
     pub fn nodata(&self, is_number: impl Fn(f64) -> bool + Copy) -> FoundNodata {
@@ -376,12 +244,6 @@ pub fn is_nodata_beside(value: f64, step: f64, others: [f64; 2]) -> bool {
     is_number_in_steps(value, step) && is_far(value, others, FAR)
 }
 
-/// Returns whether `value`, in steps of so many units, is as near to a number for nodata as it can be.
-pub fn is_number_in_steps(value: f64, step: f64) -> bool {
-    let whole = value.round();
-    is_nodata_number(whole) && (value - whole).abs() <= 0.501 * step
-}
-
 /// Returns a height as people write it.
 pub fn shown_height(value: f64) -> String {
     if value.abs() >= NO_HEIGHT { format!("{value:e}") } else { value.to_string() }
@@ -415,6 +277,7 @@ pub(crate) fn left_out(height: &SharedHeight, record: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::points::nodata_number::is_nodata_number;
 
     fn extremes(heights: impl IntoIterator<Item = f64>) -> Extremes {
         let mut extremes = Extremes::default();
@@ -424,32 +287,6 @@ mod tests {
 
     fn nodata(heights: impl IntoIterator<Item = f64>) -> Vec<f64> {
         extremes(heights).nodata(is_nodata_number).heights.iter().map(|height| height.value).collect()
-    }
-
-    #[test]
-    fn numbers_for_nodata_are_known() {
-        let known = [
-            -999.0,
-            -9999.0,
-            9999.0,
-            -99999.0,
-            -32768.0,
-            -32767.0,
-            1e20,
-            1e30,
-            -3.4028235e38,
-            -3.40282e38,
-            1.70141e38,
-            9.96921e36,
-            f64::MIN,
-            1e10,
-        ];
-        assert!(known.into_iter().all(is_nodata_number));
-        assert!(
-            ![0.0, -1.0, 999.0, -9998.0, 99.0, -99.0, 10000.0, 32768.0, 8848.0, 1.5e18, -1.234e19]
-                .into_iter()
-                .any(is_nodata_number)
-        );
     }
 
     #[test]
@@ -592,15 +429,5 @@ mod tests {
             assert!(zeros().next_to(&hills, "point").is_empty());
         }
         assert!(extremes([]).next_to(&coast, "point").is_empty());
-    }
-
-    #[test]
-    fn extremes_of_parts_are_those_of_the_whole() {
-        let heights: Vec<f64> = (0..1000).map(|i| f64::from((i * 7919) % 353) - 50.0).collect();
-        let mut parts = Extremes::default();
-        for (number, part) in (0..).zip(heights.chunks(100)) {
-            parts.add(&extremes(part.iter().copied()), number * 100);
-        }
-        assert_eq!(parts, extremes(heights));
     }
 }

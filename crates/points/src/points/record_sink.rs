@@ -24,3 +24,42 @@ pub(crate) trait RecordSink {
     /// Takes notice of `count` records that lie elsewhere than the index of the source says. They come by [`RecordSink::push`] too.
     fn misplaced(&mut self, count: u64);
 }
+
+/// A sink that changes records, or leaves some out, on their way to another sink.
+pub(crate) trait PassingSink {
+    /// Where they go.
+    type Inner: RecordSink;
+
+    /// Returns where they go.
+    fn inner(&mut self) -> &mut Self::Inner;
+
+    /// As [`RecordSink::push`].
+    fn pass(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()>;
+}
+
+impl<T: PassingSink> RecordSink for T {
+    #[inline]
+    fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
+        self.pass(number, record, place)
+    }
+
+    fn push_out_of_bounds(&mut self, class: u8) {
+        self.inner().push_out_of_bounds(class);
+    }
+
+    fn push_outlier(&mut self, class: u8, pulse_return: PulseReturn, what: impl FnOnce() -> String) {
+        self.inner().push_outlier(class, pulse_return, what);
+    }
+
+    fn malformed(&mut self, count: u64, what: impl FnOnce() -> String) {
+        self.inner().malformed(count, what);
+    }
+
+    fn not_decoded(&mut self, count: u64) {
+        self.inner().not_decoded(count);
+    }
+
+    fn misplaced(&mut self, count: u64) {
+        self.inner().misplaced(count);
+    }
+}

@@ -2,8 +2,7 @@
 
 use crate::points::axis::Axis;
 use crate::points::record::{NODATA, PointRecord};
-use crate::points::record_sink::RecordSink;
-use crate::points::returns::PulseReturn;
+use crate::points::record_sink::{PassingSink, RecordSink};
 use crs::transform::between::CrsTransform;
 use lattice::BEYOND;
 use rust_decimal::prelude::ToPrimitive;
@@ -90,8 +89,14 @@ fn no_place(transform: &RecordTransform, raw: &[i64; 3], place: &str) -> String 
     )
 }
 
-impl<S: RecordSink> RecordSink for TransformedSink<'_, S> {
-    fn push(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
+impl<S: RecordSink> PassingSink for TransformedSink<'_, S> {
+    type Inner = S;
+
+    fn inner(&mut self) -> &mut S {
+        self.inner
+    }
+
+    fn pass(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
         let mut moved = *record;
         if let Some(factor) = self.transform.heights
             && ![BEYOND, NODATA].contains(&record.raw[2])
@@ -112,25 +117,5 @@ impl<S: RecordSink> RecordSink for TransformedSink<'_, S> {
             }
         }
         self.inner.push(number, &moved, place)
-    }
-
-    fn push_out_of_bounds(&mut self, class: u8) {
-        self.inner.push_out_of_bounds(class);
-    }
-
-    fn push_outlier(&mut self, class: u8, pulse_return: PulseReturn, what: impl FnOnce() -> String) {
-        self.inner.push_outlier(class, pulse_return, what);
-    }
-
-    fn malformed(&mut self, count: u64, what: impl FnOnce() -> String) {
-        self.inner.malformed(count, what);
-    }
-
-    fn not_decoded(&mut self, count: u64) {
-        self.inner.not_decoded(count);
-    }
-
-    fn misplaced(&mut self, count: u64) {
-        self.inner.misplaced(count);
     }
 }

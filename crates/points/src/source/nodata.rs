@@ -2,8 +2,10 @@
 
 use crate::points::axis::Axis;
 use crate::points::chunk_request::ChunkRequest;
+use crate::points::extremes::Extremes;
 use crate::points::kept_heights::RawHeights;
-use crate::points::nodata::{Extremes, FoundNodata, is_number_in_steps, left_out};
+use crate::points::nodata::{FoundNodata, left_out};
+use crate::points::nodata_number::is_number_in_steps;
 use crate::points::raw_bounds::RawBounds;
 use crate::points::record::PointRecord;
 use crate::points::record_sink::RecordSink;

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::points::nodata::{FoundNodata, NO_HEIGHT, is_nodata_number};
+use crate::points::nodata::FoundNodata;
 use crate::points::nodata_choice::NodataChoice;
+use crate::points::nodata_number::{NO_HEIGHT, is_nodata_number};
 
 /// The heights of a text that stand for nodata.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

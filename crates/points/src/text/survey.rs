@@ -3,8 +3,10 @@
 use std::ops::Range;
 
 use crate::file::random_access::RandomAccessFile;
-use crate::points::nodata::{Extremes, FoundNodata, NO_HEIGHT, is_nodata_number};
+use crate::points::extremes::Extremes;
+use crate::points::nodata::FoundNodata;
 use crate::points::nodata_choice::NodataChoice;
+use crate::points::nodata_number::{NO_HEIGHT, is_nodata_number};
 use crate::text::columns::Columns;
 use crate::text::granularity::Granularity;
 use crate::text::lines::{TextLine, for_each_line};

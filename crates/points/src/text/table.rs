@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::file::random_access::RandomAccessFile;
 use crate::points::axis::Axis;
+use crate::points::extremes::{Extremes, SharedHeight};
 use crate::points::kept_heights::KeptHeights;
-use crate::points::nodata::{Extremes, SharedHeight, left_out};
+use crate::points::nodata::left_out;
 use crate::points::record_sink::RecordSink;
 use crate::points::returns::KeptReturns;
 use crate::text::columns::Columns;
