@@ -61,7 +61,7 @@ fn script_text(request: &Request, phase: Phase) -> String {
 #SBATCH --requeue
 #SBATCH --open-mode=append
 #SBATCH --signal=B:TERM@60
-# With exec the signals of Slurm reach the program, which stops with its finished steps on the disk.
+# With exec the signals of Slurm reach the program, which stops with its complete phases on the disk.
 exec {program} work {config} --phase {phase} --task $((SLURM_ARRAY_TASK_ID + ${{1:-0}}))/{count}{threads}{more}
 "#
     )

@@ -38,7 +38,7 @@ fn tiles_are_written_while_others_are_triangulated_unless_they_must_wait() {
         let report = waiting.report();
         assert_eq!(report["cut_triangles"], 0);
         assert!(
-            span(&report, "border normals")[0] >= span(&report, "triangulate")[1],
+            span(&report, "write tiles")[0] >= span(&report, "triangulate")[1],
             "{threads} threads: {}",
             report["stages"]
         );

@@ -126,32 +126,9 @@ fn max_edge_auto_cuts_the_same_triangles_where_the_claims_are_wide() {
     assert_eq!(kept(in_parts(&[file], 2_000)), whole);
 }
 
-/// What the user asks for in vain is said, with a remedy that works.
-#[test]
-fn keep_steps_is_said_to_have_no_effect() {
-    let folder = tempfile::tempdir().unwrap();
-    let files = in_files(folder.path(), &hills(8_000, 3), 4_000);
-    let wanted = |points: u64| in_parts(&files, points).with("limits", "keep_steps = true");
-    let warnings = |job: &Job| job.run_with(&["check", "--json"]).succeeded().json()["warnings"].to_string();
-    let job = wanted(2_000);
-    let said = warnings(&job);
-    assert!(said.contains("keep_steps = true has no effect"), "{said}");
-    assert!(job.report()["warnings"].to_string().contains("keep_steps = true has no effect"));
-    // The job says so before it reads its points.
-    for arguments in [&[][..], &["work", "--phase", "plan", "--task", "1/2"]] {
-        let said = wanted(2_000).run_with(arguments).succeeded().err;
-        let start = said.split("read: ").next().unwrap_or_default();
-        assert!(start.contains("keep_steps = true has no effect"), "{said}");
-    }
-    let enough: u64 = said.split("max_points_per_part = ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
-    assert!(!warnings(&wanted(enough)).contains("keep_steps"));
-    assert!(warnings(&wanted(enough - 2)).contains("keep_steps"));
-    assert!(!warnings(&in_parts(&files, 2_000)).contains("keep_steps"));
-}
-
 /// The header claims a box that holds the first points and not the last.
 #[test]
-fn a_header_that_proves_wrong_gives_one_part() {
+fn a_header_that_proves_wrong_is_measured() {
     let folder = tempfile::tempdir().unwrap();
     let mut bytes = LasFile::new(2, 2, 0, 120_000).las();
     let reach = 10.0 * 60_000.0 * 0.01;
@@ -165,6 +142,9 @@ fn a_header_that_proves_wrong_gives_one_part() {
     let job = || Job::on(&[&path]).tiles_of(10_000);
     let parts = job().with("triangulation", "max_points_per_part = 20000");
     let said = parts.run().succeeded();
-    assert!(said.err.contains("starting again without parts"), "{}", said.err);
+    assert!(said.err.contains("measuring all files and starting again"), "{}", said.err);
+    let report = std::fs::read(parts.out().join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
+    assert!(number(&report["parts"]) > 1);
     assert_eq!(parts.verified()["digest"], serde_json::json!(job().digest()));
 }

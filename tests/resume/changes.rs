@@ -3,8 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-use serde_json::Value;
-
 use crate::rig::{Rig, Run, Setup, files};
 use crate::scattered;
 
@@ -25,7 +23,7 @@ fn change_to(rig: &mut Rig, count: u64, setup: &Setup) -> (String, u64) {
 }
 
 fn rig() -> Rig {
-    Rig::new(&scattered::gaussian(20_000), &base()).committing_every(0)
+    Rig::new(&scattered::gaussian(20_000), &base())
 }
 
 #[test]
@@ -34,8 +32,8 @@ fn threads_memory_and_backend_may_change() {
     for setup in
         [base().threads(2), Setup { limits: "memory = \"1 GiB\"\nthreads = 1".into(), ..base() }, base().backend("cpu")]
     {
-        let (said, resumed) = change_to(&mut rig, 12, &setup);
-        assert!(resumed >= 12 && !said.contains("changed"), "{resumed}: {said}");
+        let (said, resumed) = change_to(&mut rig, 3, &setup);
+        assert!(resumed >= 4 && !said.contains("changed"), "{resumed}: {said}");
     }
 }
 
@@ -49,11 +47,11 @@ fn another_style_keeps_the_mesh() {
         ("[output] attributes", base().output("attributes = [\"classification\"]")),
         ("[output] hull", base().output("hull = \"whole\"")),
     ];
-    // One kill is among the leaves, the other among the tiles.
-    for ((key, setup), count) in styles.iter().zip([12, 45, 45]) {
+    // The kill comes once the part is meshed, or has its coarser tiles too. What was read and the mesh stay.
+    for ((key, setup), count) in styles.iter().zip([3, 4, 5, 3]) {
         let (said, resumed) = change_to(&mut rig, count, setup);
         assert!(said.contains(key) && said.contains("written again"), "{said}");
-        assert!(resumed >= 12 && resumed < count.max(13), "{resumed} steps");
+        assert_eq!(resumed, 2, "{said}");
     }
 }
 
@@ -65,16 +63,16 @@ fn another_geoid_keeps_the_mesh_and_bends_the_tiles_again() {
         input: "files = [\"cloud.csv\"]\ncrs = \"EPSG:32633\"".into(),
         ..Setup::tiles_of(2_000).output("format = \"3dtiles\"").output(&format!("height_offset = {offset}"))
     };
-    let mut rig = Rig::new(&scattered::uniform(20_000, 50_000, 5), &wide("0.0")).committing_every(0);
+    let mut rig = Rig::new(&scattered::uniform(20_000, 50_000, 5), &wide("0.0"));
     for (offset, is_same) in [("0.0", true), ("\"egm96\"", false)] {
         rig.forget();
         rig.configure(&wide("0.0"));
-        assert!(rig.run_to("committed", 45).was_killed());
+        assert!(rig.run_to("committed", 3).was_killed());
         rig.expect(&wide(offset));
         let said = rig.run().succeeded().err;
         let resumed = rig.is_complete(&said)["resumed"].as_u64().unwrap();
         assert_eq!(said.contains("height_offset") && said.contains("written again"), !is_same, "{said}");
-        assert!(resumed >= if is_same { 45 } else { 12 }, "{resumed} steps");
+        assert_eq!(resumed, if is_same { 4 } else { 2 }, "{said}");
         let georeference = fs::read_to_string(rig.folder.path().join("out/georeference.json")).unwrap();
         assert!(georeference.contains("\"curved\": true"), "{georeference}");
     }
@@ -91,7 +89,7 @@ fn an_option_of_the_mesh_starts_over_and_is_named() {
         // Intensities are read only if they are wanted.
         ("[output] attributes", base().output("attributes = [\"intensity\"]")),
     ] {
-        let (said, resumed) = change_to(&mut rig, 12, &setup);
+        let (said, resumed) = change_to(&mut rig, 3, &setup);
         assert!(said.contains(key) && said.contains("starting over") && resumed == 0, "{key}, {resumed}: {said}");
     }
 }
@@ -104,7 +102,7 @@ fn a_changed_input_starts_over_and_is_named() {
     let kill = |rig: &Rig| {
         rig.forget();
         fs::write(&path, &text).unwrap();
-        assert!(rig.run_to("committed", 12).was_killed());
+        assert!(rig.run_to("committed", 3).was_killed());
     };
     kill(&rig);
     fs::write(&path, text.clone() + "17,17,17\n").unwrap();
@@ -137,7 +135,7 @@ fn a_changed_input_starts_over_and_is_named() {
 fn restart_starts_over_also_under_its_old_name() {
     let rig = rig();
     for name in ["--restart", "--fresh"] {
-        assert!(rig.run_to("committed", 30).was_killed());
+        assert!(rig.run_to("committed", 4).was_killed());
         let said = Run::start(rig.command().arg(name)).end().succeeded().err;
         assert!(!said.contains("going on"), "{said}");
         assert_eq!(said.contains("--fresh has a new name: --restart"), name == "--fresh", "{said}");
@@ -164,15 +162,16 @@ fn damage(path: &Path, places: &[f64]) {
 }
 
 #[test]
-fn damaged_records_of_the_store_are_made_again() {
+fn a_job_with_damaged_records_starts_over() {
     let rig = rig();
-    // Among the leaves, the border normals and the tiles.
-    for count in [10, 20, 30, 45] {
+    // Once the points are read, the part is meshed, and it has its coarser tiles.
+    for count in [2, 3, 4] {
         for places in [&[0.1][..], &[0.5, 0.9], &[0.999]] {
             rig.forget();
             assert!(rig.run_to("committed", count).was_killed());
             rig.stores().iter().for_each(|store| damage(store, places));
-            rig.completes(&format!("damage at {places:?} after {count} commits"));
+            let report = rig.completes(&format!("damage at {places:?} after {count} phases"));
+            assert_eq!(report["resumed"], 0);
         }
         rig.forget();
         assert!(rig.run_to("committed", count).was_killed());
@@ -180,22 +179,22 @@ fn damaged_records_of_the_store_are_made_again() {
             let half = fs::metadata(&store).unwrap().len() / 2;
             fs::File::options().write(true).open(&store).unwrap().set_len(half).unwrap();
         }
-        rig.completes(&format!("half a store after {count} commits"));
+        rig.completes(&format!("half a store after {count} phases"));
     }
     rig.forget();
-    assert!(rig.run_to("committed", 30).was_killed());
+    assert!(rig.run_to("committed", 3).was_killed());
     fs::remove_file(&rig.stores()[3]).unwrap();
-    let report = rig.completes("a file of the store is missing");
-    assert!(report["resumed"].as_u64().unwrap() > 5, "the steps in the other files stay");
+    rig.completes("a file of the store is missing");
 }
 
 #[test]
 fn files_of_another_version_are_removed_at_once() {
     let rig = rig();
-    assert!(rig.run_to("committed", 10).was_killed());
+    assert!(rig.run_to("committed", 3).was_killed());
     let old = rig.out().join("job/steps.store");
     fs::write(&old, "as another version called it").unwrap();
-    assert!(rig.run_to("committed", 3).was_killed());
+    fs::write(rig.out().join("job/journal"), "as another version wrote it").unwrap();
+    assert!(rig.run_to("committed", 1).was_killed());
     assert!(!old.exists());
     rig.completes("after that");
 }
@@ -203,7 +202,7 @@ fn files_of_another_version_are_removed_at_once() {
 #[test]
 fn damaged_or_missing_tiles_are_written_again() {
     let rig = rig();
-    assert!(rig.run_to("committed", 45).was_killed());
+    assert!(rig.run_to("committed", 4).was_killed());
     let tiles = || fs::read_dir(rig.out().join("job/results/tiles")).unwrap().map(|entry| entry.unwrap().path());
     assert!(tiles().count() >= 3);
     for (i, path) in tiles().enumerate() {
@@ -213,15 +212,16 @@ fn damaged_or_missing_tiles_are_written_again() {
             _ => damage(&path, &[0.5]),
         }
     }
-    let resumed = rig.completes("damaged tiles")["resumed"].as_u64().unwrap();
-    assert!((20..45).contains(&resumed), "{resumed} steps instead of all but the tiles");
+    let said = rig.run().succeeded().err;
+    assert!(said.contains("is damaged; starting over"), "{said}");
+    rig.is_complete("damaged tiles");
 }
 
 #[test]
 fn damaged_points_are_read_again() {
     let rig = rig();
-    assert!(rig.run_to("committed", 3).was_killed());
-    let points = rig.out().join("job/points");
+    assert!(rig.run_to("committed", 2).was_killed());
+    let points = rig.out().join("job/points-by-part/0/0.points");
     let mut bytes = fs::read(&points).unwrap();
     bytes.iter_mut().for_each(|byte| *byte = !*byte);
     fs::write(&points, bytes).unwrap();
@@ -235,7 +235,7 @@ fn a_job_with_a_broken_journal_starts_over() {
     let rig = rig();
     for garbage in [&b""[..], b"\n\n", b"\xff\xfe\x00", b"0000000000000000 {}\n"] {
         rig.forget();
-        assert!(rig.run_to("committed", 20).was_killed());
+        assert!(rig.run_to("committed", 3).was_killed());
         fs::write(rig.out().join("job/journal"), garbage).unwrap();
         assert_eq!(rig.completes("a journal of garbage")["resumed"], 0);
     }
@@ -248,8 +248,7 @@ fn results_of_an_earlier_job_stay_until_the_new_mesh_is_there() {
     let earlier = files(&rig.out());
     let path = rig.folder.path().join("cloud.csv");
     fs::write(&path, fs::read_to_string(&path).unwrap() + "17,17,17\n").unwrap();
-    // Among the leaves and merges.
-    assert!(rig.run_to("committed", 20).was_killed());
+    assert!(rig.run_to("committed", 3).was_killed());
     let mut found = files(&rig.out());
     found.retain(|name, _| !name.starts_with("job/"));
     assert!(found == earlier, "{:?}", found.keys());
@@ -263,7 +262,7 @@ fn a_run_that_fails_for_good_removes_the_files_of_an_interrupted_run() {
     let rig = rig();
     let path = rig.folder.path().join("cloud.csv");
     let text = fs::read_to_string(&path).unwrap();
-    assert!(rig.run_to("committed", 45).was_killed());
+    assert!(rig.run_to("committed", 3).was_killed());
     assert!(files(&rig.out().join("job/results/tiles")).len() >= 3);
     // On one line there is no triangle, and only the merges can tell.
     fs::write(&path, (0..20).map(|i| format!("{i},{i},{i}\n")).collect::<String>()).unwrap();
@@ -274,51 +273,32 @@ fn a_run_that_fails_for_good_removes_the_files_of_an_interrupted_run() {
     rig.completes("good again");
 }
 
-/// With "auto" the next run counts the sites of all leaves again, even of those whose tiles are written.
+/// Whether a job has one part or several, no leaf is triangulated again.
 #[test]
-fn damaged_leaves_are_made_again_before_auto_counts_their_sites() {
-    let rig = Rig::new(&scattered::gaussian(20_000), &base().output("max_edge = \"auto\"")).committing_every(0);
-    assert!(rig.run_to("committed", 45).was_killed());
-    let journal = fs::read_to_string(rig.out().join("job/journal")).unwrap();
-    let entries = journal.lines().skip(1).map(|line| line.split_once(' ').unwrap().1);
-    let entries: Vec<Value> = entries.map(|text| serde_json::from_str(text).unwrap()).collect();
-    let is_written = |tile: &Value| entries.iter().any(|entry| entry["step"]["WriteTile"] == *tile);
-    let stores = rig.stores();
-    let mut bytes = stores.each_ref().map(|store| fs::read(store).unwrap());
-    let mut lost = 0;
-    for stored in entries.iter().flat_map(|entry| entry["records"].as_array().unwrap()) {
-        let leaf = &stored["key"]["Leaf"];
-        if leaf.is_u64() && is_written(leaf) {
-            let [at, length] = ["at", "length"].map(|name| stored[name].as_u64().unwrap() as usize);
-            bytes[leaf.as_u64().unwrap() as usize % stores.len()][at..at + length].fill(0);
-            lost += 1;
-        }
-    }
-    assert!(lost >= 3 && !rig.out().join("tileset.json").exists());
-    stores.iter().zip(bytes).for_each(|(store, bytes)| fs::write(store, bytes).unwrap());
-    rig.completes("leaves of zeroes");
-}
-
-/// What the warning about `keep_steps` advises for a job of several parts works.
-#[test]
-fn a_job_of_several_parts_starts_over_with_another_style_and_one_part_goes_on() {
+fn another_style_keeps_the_mesh_of_one_part_and_of_several() {
     let setup = |points: u64| Setup {
+        input: "files = [\"part_*.csv\"]".into(),
         triangulation: format!("{}\nmax_points_per_part = {points}", base().triangulation),
         limits: "threads = 1\nkeep_steps = true".into(),
         ..base()
     };
-    let mut rig = Rig::of_files(tempfile::tempdir().unwrap(), &scattered::gaussian(20_000), 60_000, &setup(4_000))
-        .committing_every(0);
-    let files = |setup: Setup| Setup { input: "files = [\"part_*.csv\"]".into(), ..setup };
-    let check = Run::start(&mut rig.command_of(&["check", "job.toml"])).end().succeeded().out;
-    let enough = check.split("max_points_per_part = ").nth(1).unwrap().split(' ').next().unwrap();
-    for (points, starts_over) in [(4_000, true), (enough.parse().unwrap(), false)] {
+    let mut rig = Rig::of_files(tempfile::tempdir().unwrap(), &scattered::gaussian(20_000), 60_000, &setup(4_000));
+    for (points, kill, parts) in [(20_000, "committed:3", 1), (4_000, "replacing:1", 5), (4_000, "committed:18", 5)] {
         rig.forget();
-        rig.configure(&files(setup(points)));
-        assert!(rig.run_to("committed", 30).was_killed());
-        rig.expect(&files(setup(points).output("normals = false")));
-        let said = rig.run().succeeded().err;
-        assert_eq!(said.contains("starting over"), starts_over, "{said}");
-        rig.is_complete(&said);
+        rig.configure(&setup(points));
+        let killed = Run::start(rig.command().env("GDT_FAULT", kill)).end();
+        assert!(killed.was_killed(), "{killed:?}");
+        rig.expect(&setup(points).output("normals = false"));
+        let is_all_meshed = kill != "committed:18";
+        if is_all_meshed {
+            // This would be the end at the first leaf.
+            let said = Run::start(rig.command().env("GDT_FAULT", "leaf:1")).end().succeeded().err;
+            assert!(said.contains("the tiles are written again"), "{said}");
+        } else {
+            rig.run().succeeded();
+        }
+        let report = rig.is_complete(kill);
+        assert!(report["parts"].as_u64() >= Some(parts), "{report}");
+        assert!(report["resumed"].as_u64() >= Some(2), "{report}");
     }
 }

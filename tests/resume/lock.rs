@@ -5,7 +5,7 @@ use crate::scattered;
 
 #[test]
 fn a_second_process_is_told_which_process_works_in_the_directory() {
-    let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(1_000)).committing_every(0);
+    let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(1_000));
     let mut first = Run::start(&mut rig.command());
     let journal = rig.out().join("job/journal");
     first.wait_until(|| journal.exists());
@@ -20,8 +20,8 @@ fn a_second_process_is_told_which_process_works_in_the_directory() {
 
 #[test]
 fn the_lock_of_a_killed_process_does_not_stop_the_next_run() {
-    let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000)).committing_every(0);
-    assert!(rig.run_to("committed", 5).was_killed());
+    let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000));
+    assert!(rig.run_to("committed", 3).was_killed());
     assert!(rig.out().join("job/lock").exists());
-    assert!(rig.completes("after a kill")["resumed"].as_u64() >= Some(5));
+    assert!(rig.completes("after a kill")["resumed"].as_u64() >= Some(3));
 }

@@ -18,8 +18,10 @@ fn a_job_of_many_folders_goes_on_where_it_was_killed() {
         assert!(rig.expected.keys().any(|name| name.starts_with(folder)), "{folder}");
     }
     for (place, count) in [
-        ("committed", 4),
-        ("published", 6),
+        ("committed", 3),
+        ("published", 4),
+        ("leaf", 500),
+        ("tile", 300),
         ("replacing", 1),
         ("replacing", 400),
         ("replacing", 1_100),

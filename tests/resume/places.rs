@@ -16,7 +16,7 @@ fn rig() -> Rig {
     cloud.sort_unstable();
     let setup = Setup::tiles_of(2_000);
     let setup = Setup { input: setup.input + "\nmax_malformed_fraction = 0.1", ..setup };
-    let mut rig = Rig::new(&cloud, &setup).committing_every(0);
+    let mut rig = Rig::new(&cloud, &setup);
     let path = rig.folder.path().join("cloud.csv");
     fs::write(&path, fs::read_to_string(&path).unwrap() + "1,2\n1,two,3\n").unwrap();
     rig.expect(&setup);
@@ -26,7 +26,7 @@ fn rig() -> Rig {
 /// Runs the configuration at `config` in `directory`.
 fn run_in(directory: &Path, config: &str) -> End {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
-    Run::start(command.arg(config).current_dir(directory).env("GDT_COMMIT_MS", "0")).end()
+    Run::start(command.arg(config).current_dir(directory)).end()
 }
 
 /// Asserts that a run went on from an interrupted one, ended with the right bytes in `out`, and calls the input `name`.
@@ -55,7 +55,7 @@ fn a_run_from_another_working_directory_goes_on() {
         ("a/../a/..", "./job.toml", "cloud.csv"),
     ] {
         // Among the leaves, and among the tiles.
-        for count in [8, 30] {
+        for count in [2, 4] {
             rig.forget();
             assert!(rig.run_to("committed", count).was_killed());
             went_on(&rig, run_in(&folder.join(directory), config), &rig.out(), name);
@@ -68,9 +68,9 @@ fn every_run_may_have_another_working_directory() {
     let rig = rig();
     let folder = rig.folder.path();
     fs::create_dir_all(folder.join("a/b")).unwrap();
-    assert!(rig.run_to("committed", 8).was_killed());
+    assert!(rig.run_to("committed", 2).was_killed());
     let mut again = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
-    again.arg("../job.toml").current_dir(folder.join("a")).env("GDT_COMMIT_MS", "0").env("GDT_FAULT", "committed:5");
+    again.arg("../job.toml").current_dir(folder.join("a")).env("GDT_FAULT", "committed:1");
     assert!(Run::start(&mut again).end().was_killed());
     went_on(&rig, run_in(&folder.join("a/b"), "../../job.toml"), &rig.out(), "../../cloud.csv");
 }
@@ -86,7 +86,7 @@ fn another_spelling_of_the_path_or_a_link_to_the_file_goes_on() {
     for spelling in ["./cloud.csv", "links/../cloud.csv", "links/renamed.csv", "links/folder/cloud.csv", "cl*.csv"] {
         rig.forget();
         fs::write(folder.join("job.toml"), &configuration).unwrap();
-        assert!(rig.run_to("committed", 8).was_killed());
+        assert!(rig.run_to("committed", 2).was_killed());
         fs::write(folder.join("job.toml"), configuration.replace("cloud.csv", spelling)).unwrap();
         let name = spelling.trim_start_matches("./").replace('*', "oud");
         went_on(&rig, rig.run(), &rig.out(), &name);
@@ -97,11 +97,11 @@ fn another_spelling_of_the_path_or_a_link_to_the_file_goes_on() {
 fn a_job_goes_on_after_its_folder_has_moved() {
     let rig = rig();
     let moved = tempfile::tempdir().unwrap();
-    for (count, damage_points) in [(8, false), (30, false), (8, true)] {
+    for (count, damage_points) in [(2, false), (4, false), (2, true)] {
         rig.forget();
         let absolute = rig.folder.path().join("job.toml");
         let mut first = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
-        first.arg(&absolute).current_dir("/").env("GDT_COMMIT_MS", "0").env("GDT_FAULT", format!("committed:{count}"));
+        first.arg(&absolute).current_dir("/").env("GDT_FAULT", format!("committed:{count}"));
         assert!(Run::start(&mut first).end().was_killed());
         let to: PathBuf = moved.path().join(format!("{count} {damage_points}"));
         fs::create_dir(&to).unwrap();
@@ -110,7 +110,7 @@ fn a_job_goes_on_after_its_folder_has_moved() {
         }
         if damage_points {
             // The inputs are read again, where they are now.
-            fs::write(to.join("out/job/points"), "").unwrap();
+            fs::write(to.join("out/job/points-by-part/0/0.points"), "").unwrap();
             let said = run_in(&to, "job.toml").succeeded().err;
             assert!(said.contains("is damaged; starting over"), "{said}");
             assert!(files(&to.join("out")) == rig.expected);

@@ -99,7 +99,7 @@ pub(crate) fn setup() -> Setup {
 
 #[test]
 fn a_job_goes_on_after_a_power_failure() {
-    let rig = Rig::new(&scattered::clusters(12_000), &setup()).committing_every(0);
+    let rig = Rig::new(&scattered::clusters(12_000), &setup()).syncing();
     for folder in ["cut/", "levels/"] {
         assert!(rig.expected.keys().any(|name| name.starts_with(folder)), "{folder}");
     }
@@ -109,7 +109,7 @@ fn a_job_goes_on_after_a_power_failure() {
 /// Results of the store need not be on the disk when the points go.
 #[test]
 fn a_job_of_two_threads_that_commits_now_and_then_goes_on_after_a_power_failure() {
-    let rig = Rig::new(&scattered::clusters(12_000), &setup().threads(2)).committing_every(5);
+    let rig = Rig::new(&scattered::clusters(12_000), &setup().threads(2));
     fail_again_and_again(&rig, 30);
 }
 
@@ -118,14 +118,14 @@ fn a_job_of_parts_goes_on_after_a_power_failure() {
     let setup = setup();
     let setup = Setup { triangulation: format!("{}\nmax_points_per_part = 4000", setup.triangulation), ..setup };
     let folder = tempfile::tempdir().unwrap();
-    let rig = Rig::of_files(folder, &scattered::gaussian(14_000), 60_000, &setup).committing_every(0);
+    let rig = Rig::of_files(folder, &scattered::gaussian(14_000), 60_000, &setup).syncing();
     fail_again_and_again(&rig, 25);
 }
 
 #[test]
 fn a_power_failure_leaves_the_results_of_the_earlier_job_or_those_of_this_one() {
     let folder_of = |rig: &Rig, cloud| scattered::write(rig.folder.path(), "cloud.csv", cloud);
-    let mut rig = Rig::new(&scattered::gaussian(9_000), &setup()).committing_every(0);
+    let mut rig = Rig::new(&scattered::gaussian(9_000), &setup()).syncing();
     rig.completes("the earlier job");
     folder_of(&rig, &scattered::clusters(12_000));
     rig.expect(&setup());
@@ -135,7 +135,7 @@ fn a_power_failure_leaves_the_results_of_the_earlier_job_or_those_of_this_one() 
 /// Every sync is needed, and the model of the disk notices if it is left out.
 #[test]
 fn a_program_that_does_not_sync_breaks_its_promise() {
-    let mut rig = Rig::new(&scattered::gaussian(3_000), &setup()).committing_every(0);
+    let mut rig = Rig::new(&scattered::gaussian(3_000), &setup()).syncing();
     rig.completes("the earlier job");
     scattered::write(rig.folder.path(), "cloud.csv", &scattered::clusters(4_000));
     rig.expect(&setup());

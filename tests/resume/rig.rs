@@ -8,6 +8,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use job::durable::directory::{JobDirectory, STORE_FILES};
+use job::index::PartIndex;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -190,9 +191,9 @@ impl Rig {
         fs::write(self.folder.path().join("job.toml"), setup.text()).unwrap();
     }
 
-    /// Sets the milliseconds between two commits of the journal. With 0 every record is a commit of its own.
-    pub(crate) fn committing_every(mut self, milliseconds: u64) -> Rig {
-        self.environment.push(("GDT_COMMIT_MS", milliseconds.to_string()));
+    /// Lets the job wait for the disk as often as one that has run for long.
+    pub(crate) fn syncing(mut self) -> Rig {
+        self.environment.push(("GDT_SYNC", "1".into()));
         self
     }
 
@@ -263,15 +264,23 @@ impl Rig {
         }
     }
 
-    /// Returns the number of steps in the journal.
-    pub(crate) fn steps(&self) -> usize {
-        let journal = fs::read(self.out().join("job/journal")).unwrap_or_default();
-        journal.iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1)
+    /// Returns the number of phases that the journals of the job and of its first part name.
+    pub(crate) fn phases(&self) -> usize {
+        let lines = |path: &str| {
+            let journal = fs::read(self.out().join(path)).unwrap_or_default();
+            journal.iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1)
+        };
+        lines("job/journal") + lines("job/parts/0/journal")
     }
 
-    /// Returns the files with the results of the steps.
+    /// Returns the files in which the first part keeps what its phases leave.
     pub(crate) fn stores(&self) -> [PathBuf; STORE_FILES] {
-        JobDirectory::new(&self.out()).store()
+        JobDirectory::new(&self.out()).part(PartIndex::FIRST).store()
+    }
+
+    /// Returns the bytes in these files.
+    pub(crate) fn stored(&self) -> u64 {
+        self.stores().iter().filter_map(|path| fs::metadata(path).ok()).map(|data| data.len()).sum()
     }
 
     /// Removes the output directory.

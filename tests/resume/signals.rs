@@ -7,7 +7,7 @@ use crate::scattered;
 
 /// Returns a job of many steps that each wait for the disk, long enough for signals to arrive while it runs.
 fn long_job(threads: usize) -> Rig {
-    Rig::new(&scattered::gaussian(60_000), &Setup::tiles_of(500).threads(threads)).committing_every(0)
+    Rig::new(&scattered::gaussian(60_000), &Setup::tiles_of(500).threads(threads))
 }
 
 /// Tells whether this process, and so every job that it starts, ignores the hangup of its terminal.
@@ -26,19 +26,16 @@ fn a_job_stopped_by_sigterm_ctrl_c_or_a_hangup_goes_on_where_it_stopped() {
             continue;
         }
         let rig = long_job(threads);
-        // Among the leaves, the border normals and the tiles.
-        for steps in [50, 200, 300] {
+        // Among the leaves and tiles.
+        for bytes in [50_000, 200_000, 500_000] {
+            rig.forget();
             let mut run = Run::start(&mut rig.command());
-            run.wait_until(|| rig.steps() > steps);
+            run.wait_until(|| rig.stored() > bytes);
             run.signal(signal);
-            run.end().stopped(&[
-                "error: interrupted",
-                "finished steps are kept in out/job",
-                "run the same command again",
-            ]);
+            run.end().stopped(&["error: interrupted", "what is done is kept in out/job", "run the same command again"]);
             rig.has_nothing_half_written(signal);
         }
-        assert!(rig.completes(signal)["resumed"].as_u64() > Some(100));
+        assert_eq!(rig.completes(signal)["resumed"], 2);
     }
 }
 
@@ -72,8 +69,8 @@ fn a_job_under_nohup_does_not_end_with_its_terminal() {
     let rig = long_job(2);
     let mut command = std::process::Command::new("sh");
     command.args(["-c", "trap '' HUP; exec \"$0\" job.toml", env!("CARGO_BIN_EXE_gdt-batch")]);
-    let mut run = Run::start(command.current_dir(rig.folder.path()).env("GDT_COMMIT_MS", "0"));
-    run.wait_until(|| rig.steps() > 50);
+    let mut run = Run::start(command.current_dir(rig.folder.path()));
+    run.wait_until(|| rig.stored() > 50_000);
     run.signal("HUP");
     run.end().succeeded();
     rig.is_complete("after a hangup");
@@ -83,7 +80,7 @@ fn a_job_under_nohup_does_not_end_with_its_terminal() {
 fn a_job_interrupted_before_its_first_step_leaves_nothing() {
     let rig = Rig::new(&scattered::gaussian(400_000), &Setup::tiles_of(20_000));
     let mut run = Run::start(&mut rig.command());
-    let points = rig.out().join("job/points");
+    let points = rig.out().join("job/points-by-part");
     run.wait_until(|| points.exists());
     run.signal("INT");
     let end = run.end().stopped(&["error: interrupted"]);
@@ -98,10 +95,10 @@ fn the_reference_is_left_behind_when_the_job_is_stopped() {
     // One leaf, which takes `spade` longer than a run may last here.
     let line = (0..300_000).map(|i| if i == 0 { [40_000, 70_000] } else { [2 * i, 0] });
     let setup = Setup::tiles_of(1_000_000);
-    let rig = Rig::new(&scattered::with_heights(line), &setup).committing_every(0);
+    let rig = Rig::new(&scattered::with_heights(line), &setup);
     rig.configure(&setup.clone().backend("reference"));
     let mut run = Run::start(&mut rig.command());
-    run.wait_until(|| rig.steps() == 1);
+    run.wait_until(|| rig.phases() == 2);
     std::thread::sleep(Duration::from_millis(50));
     run.signal("TERM");
     run.end().stopped(&["error: interrupted"]);
@@ -112,9 +109,9 @@ fn the_reference_is_left_behind_when_the_job_is_stopped() {
 #[test]
 fn a_second_ctrl_c_ends_the_job_at_once() {
     // One leaf that takes long and does not check for signals.
-    let rig = Rig::new(&scattered::uniform(800_000, 1_000_000, 1), &Setup::tiles_of(1_000_000)).committing_every(0);
+    let rig = Rig::new(&scattered::uniform(800_000, 1_000_000, 1), &Setup::tiles_of(1_000_000));
     let mut run = Run::start(&mut rig.command());
-    run.wait_until(|| rig.steps() == 1);
+    run.wait_until(|| rig.phases() == 2);
     std::thread::sleep(Duration::from_millis(50));
     run.signal("INT");
     std::thread::sleep(Duration::from_millis(20));

@@ -40,11 +40,6 @@ impl MaxPointsPerPart {
     pub fn most_in_one_part(self) -> u64 {
         self.0 / 2 * 3
     }
-
-    /// Returns the least number with which a job of `points` points is one part.
-    pub fn for_one_part(points: u64) -> MaxPointsPerPart {
-        MaxPointsPerPart(2 * points.div_ceil(3))
-    }
 }
 
 impl Default for MaxPointsPerPart {

@@ -24,20 +24,31 @@ pub enum Error {
     /// A task came before what it needs was done.
     #[error("{0}")]
     TooEarly(String),
-    /// A job stopped, and its finished steps are kept.
-    #[error("{why}\nfinished steps are kept in {} ({steps}): {}, without --restart, to go on", name(job), again(why))]
+    /// A job stopped, and its complete phases are kept.
+    #[error(
+        "{why}\nwhat is done is kept in {} ({phases} phases): {}, without --restart, to go on",
+        name(job),
+        again(why)
+    )]
     Resumable {
         /// Why the job stopped.
         why: Box<Error>,
-        /// The number of finished steps.
-        steps: u64,
+        /// The number of complete phases.
+        phases: u64,
         /// The job directory.
         job: PathBuf,
     },
-    /// What was read contradicts the headers, so a job of several parts starts again as one part. No user sees this.
-    #[error("what was read contradicts the header of a file")]
-    NeedsOnePart,
-    /// What an interrupted run left is damaged, so the job starts over. No user sees this.
+    /// What was read is other than the plan claims: a header is wrong, or a file bad that is to be left out. All inputs are measured, and the
+    /// job starts again. A user sees this only if an input changes in between.
+    #[error("an input has changed while the job read it: run again")]
+    OtherThanClaimed {
+        /// Whether a file is bad, not a header wrong.
+        is_bad_file: bool,
+    },
+    /// These inputs proved bad when all were measured, each for a reason, and the job is planned without them. No user sees this.
+    #[error("{} inputs are bad", .0.len())]
+    BadInputs(Vec<(PathBuf, String)>),
+    /// What an interrupted run left is damaged, so the job starts over, or tasks say so. No user sees this.
     #[error("what the interrupted run left is damaged")]
     DamagedSteps,
     /// The mesh has a triangle too long for single precision at the resolution of the job.
@@ -60,11 +71,11 @@ impl Error {
     pub fn kind(&self) -> ErrorKind {
         match self {
             Error::System(error) => error.kind(),
-            Error::InUse { .. } | Error::TooEarly(_) => ErrorKind::Retry,
+            Error::InUse { .. } | Error::TooEarly(_) | Error::OtherThanClaimed { .. } => ErrorKind::Retry,
             Error::Resumable { why, .. } => why.kind(),
             Error::TooFine { .. } => ErrorKind::Usage,
             Error::NoTerrain(_) => ErrorKind::Input,
-            Error::NeedsOnePart | Error::DamagedSteps => ErrorKind::Internal,
+            Error::BadInputs(_) | Error::DamagedSteps => ErrorKind::Internal,
         }
     }
 }

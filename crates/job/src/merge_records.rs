@@ -2,7 +2,7 @@
 
 use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::index::{NodeIndex, TileIndex};
-use crate::records::{BorderVertex, RecordRef, SeamTriangle, StepRecord, Store};
+use crate::records::{BorderVertex, SeamTriangle, StepRecord, Store};
 use bytemuck::{Pod, Zeroable};
 use delaunay::geometry::Site;
 use sys::Result;
@@ -81,7 +81,7 @@ impl Frontier {
     ///
     /// # Errors
     /// [`sys::Error::Io`].
-    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
+    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<()> {
         let counted = ColumnWriter::default().push(&self.sites).push(&self.questions);
         let ground = counted.push(&self.boundary).push(&self.passes).push(std::slice::from_ref(&self.triangles));
         ground.write(store, StepRecord::Frontier(node))
@@ -174,7 +174,7 @@ impl Seam {
     ///
     /// # Errors
     /// [`sys::Error::Io`].
-    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
+    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<()> {
         let columns = ColumnWriter::default().push(std::slice::from_ref(&self.hull)).push(&self.index);
         columns.push(&self.trimmed).push(&self.triangles).write(store, StepRecord::Seam(node))
     }

@@ -72,16 +72,16 @@ pub struct Limits {
     pub memory: MemoryLimit,
     /// Worker threads; 0: one per core.
     pub threads: Threads,
-    /// Whether finished steps stay on the disk until the end of the job.
+    /// Whether the mesh stays on the disk until the end of the job.
     pub keep_steps: KeepSteps,
 }
 
-/// Whether points and steps of a job of one part stay on the disk until it is done, though no later step needs them. If they do, an
-/// interrupted job can go on with another style; if not, it takes less than half of the disk. A job of several parts never keeps them.
+/// Whether the mesh of a job stays on the disk until it is done, though no later phase needs all of it. If it does, an interrupted job can go
+/// on with another style; if not, the job takes less of the disk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "toml::Value", into = "toml::Value")]
 pub enum KeepSteps {
-    /// In jobs that are done again soon.
+    /// In jobs that take little of the disk.
     #[default]
     Auto,
     /// Yes.
@@ -91,14 +91,13 @@ pub enum KeepSteps {
 }
 
 impl KeepSteps {
-    /// With "auto", jobs of fewer points keep their steps. They take less than a gigabyte or two for it, and are done again within
-    /// minutes.
-    const FEW_POINTS: u64 = 50_000_000;
+    /// With "auto", jobs of so many points or fewer keep their mesh. They take about a gigabyte for it.
+    const FEW_POINTS: u64 = 30_000_000;
 
-    /// Tells whether a job of one part and of `points` points keeps its steps.
+    /// Tells whether a job of `points` points keeps its mesh.
     pub fn keeps(self, points: u64) -> bool {
         match self {
-            KeepSteps::Auto => points < KeepSteps::FEW_POINTS,
+            KeepSteps::Auto => points <= KeepSteps::FEW_POINTS,
             KeepSteps::Always => true,
             KeepSteps::Never => false,
         }

@@ -20,41 +20,31 @@ use tiles::normals::NormalSum;
 pub type Store = store::Store<StepRecord>;
 /// A record of a job's store as the journal knows it.
 pub type RecordRef = store::RecordRef<StepRecord>;
-/// What a finished step of a job gives back.
-pub type StepOutput<T> = journal::StepOutput<T, StepRecord>;
+/// What has become of the records of a job's store since its journal was told.
+pub type RecordChanges = store::RecordChanges<StepRecord>;
 /// The journal of a job.
 pub type Journal<'a> = journal::Journal<'a, JobStep, StepRecord>;
+/// A line that is to be added to it.
+pub type NewEntry = journal::NewEntry<JobStep, StepRecord>;
 /// A line of a job's journal.
 pub type JournalEntry = journal::JournalEntry<JobStep, StepRecord>;
 
-/// A step of a job, for one tile or one tree node where it runs once for each.
+/// A phase of a job, of a part of it, or of the nodes above the parts, as the journal of each names it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum JobStep {
-    /// Plans a job of several parts, and finds out how its scene follows the curve of the earth.
+    /// Plans the job, and finds out how its scene follows the curve of the earth.
     Plan,
-    /// Reads the points of a part and cuts it into tiles.
-    Partition,
     /// Reads the inputs that a part is the first to need.
-    Read(PartIndex),
-    /// Finds out how the scene of a job of one part follows the curve of the earth.
-    Curve,
-    /// Triangulates a tile.
-    Leaf(TileIndex),
-    /// Merges what the nodes below a node left pending.
+    Read,
+    /// Triangulates a part.
+    Mesh,
+    /// Writes tiles of a part. There is a line for those that are written at one time.
+    Tiles,
+    /// Merges at a node above the parts.
     Merge(NodeIndex),
-    /// Triangulates a part and writes the tiles that need no other part.
-    MeshPart,
-    /// Finishes the normals on a tile's border.
-    BorderNormals(TileIndex),
-    /// Writes a tile.
-    WriteTile(TileIndex),
-    /// Merges above the parts, and finds out how tiles look.
+    /// Merges at all nodes above the parts, and finds out how tiles look.
     Join,
-    /// Writes the tiles of a part that have waited for other parts.
-    WriteWaiting,
-    /// Makes a coarser tile.
-    Level(NodeIndex),
-    /// Makes all coarser tiles of a part.
+    /// Makes the coarser tiles of a part, or those above the parts.
     Levels,
     /// Writes the raster of heights.
     Raster,
@@ -154,8 +144,8 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// Writes the record of `tile`: its sites, which are `points`, and those of the `triangles` that are marked as final. Returns the record
-    /// and the number of these triangles.
+    /// Writes the record of `tile`: its sites, which are `points`, and those of the `triangles` that are marked as final. Returns the number
+    /// of these triangles.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -164,7 +154,7 @@ impl Leaf {
         tile: TileIndex,
         points: &[Point],
         triangles: impl ExactSizeIterator<Item = ([u32; 3], bool)>,
-    ) -> Result<(RecordRef, u64)> {
+    ) -> Result<u64> {
         let key = StepRecord::Leaf(tile);
         // These records are most of what a job stores, so they are packed.
         let (count, mut positions, mut attributes) = ([points.len() as u64], Vec::new(), Vec::new());
@@ -174,15 +164,11 @@ impl Leaf {
         if points.iter().any(|point| point.intensity != 0) {
             pack(points, |point| [point.intensity as u32], &mut attributes);
         }
-        let columns = ColumnWriter::default().push(&count).push(&positions).push(&attributes);
-        // Packing triangles would take more time than it saves, but corners take two bytes where that is enough.
-        if has_short_corners(points.len()) {
-            let triangles = marked(triangles.map(|(t, is_final)| (t.map(|v| v as u16), is_final)));
-            Ok((columns.push(&triangles).write(store, key)?, triangles.len() as u64))
-        } else {
-            let triangles = marked(triangles);
-            Ok((columns.push(&triangles).write(store, key)?, triangles.len() as u64))
-        }
+        let (triangles, mut corners) = (marked(triangles), Vec::new());
+        pack(&triangles, |&[a, b, c]| [a, b.wrapping_sub(a), c.wrapping_sub(a)], &mut corners);
+        let (number, columns) = ([triangles.len() as u64], ColumnWriter::default().push(&count).push(&positions));
+        columns.push(&attributes).push(&number).push(&corners).write(store, key)?;
+        Ok(number[0])
     }
 
     /// Reads the record of `tile`.
@@ -202,7 +188,7 @@ impl Leaf {
             let rest = unpack(rest, count, |[intensity]| intensity as u16, &mut intensity);
             rest.filter(|rest| rest.is_empty()).ok_or_else(|| Leaf::damaged(tile))?;
         }
-        Ok(Leaf { positions, rgb, class, intensity, triangles: Leaf::read_triangles(&mut columns, count)? })
+        Ok(Leaf { positions, rgb, class, intensity, triangles: Leaf::read_triangles(&mut columns, tile)? })
     }
 
     /// Reads the record of `tile` without colours, classes and intensities.
@@ -211,16 +197,19 @@ impl Leaf {
     /// As [`Leaf::load`].
     pub fn load_mesh(store: &Store, tile: TileIndex) -> Result<Leaf> {
         let mut columns = ColumnReader::open(store, StepRecord::Leaf(tile))?;
-        let (count, positions) = Leaf::read_positions(&mut columns, tile)?;
+        let (_, positions) = Leaf::read_positions(&mut columns, tile)?;
         columns.skip_column::<u8>()?;
-        Ok(Leaf { positions, triangles: Leaf::read_triangles(&mut columns, count)?, ..Leaf::default() })
+        Ok(Leaf { positions, triangles: Leaf::read_triangles(&mut columns, tile)?, ..Leaf::default() })
     }
 
-    fn read_triangles(columns: &mut ColumnReader<StepRecord>, count: usize) -> Result<Vec<[u32; 3]>> {
-        if has_short_corners(count) {
-            return Ok(widened(&columns.column::<[u16; 3]>()?));
-        }
-        columns.column_vec()
+    fn read_triangles(columns: &mut ColumnReader<StepRecord>, tile: TileIndex) -> Result<Vec<[u32; 3]>> {
+        let count = columns.column::<u64>()?;
+        let &[count] = &count[..] else { return Err(Leaf::damaged(tile)) };
+        let packed = columns.column::<u8>()?;
+        let mut triangles = Vec::with_capacity(with_room((count as usize).min(packed.len() * 256)));
+        let join = |[a, b, c]: [u32; 3]| [a, a.wrapping_add(b), a.wrapping_add(c)];
+        let rest = unpack(&packed, count as usize, join, &mut triangles);
+        rest.map(|_| triangles).ok_or_else(|| Leaf::damaged(tile))
     }
 
     fn read_positions(columns: &mut ColumnReader<StepRecord>, tile: TileIndex) -> Result<(usize, Vec<[i32; 3]>)> {
@@ -267,27 +256,9 @@ fn marked<T: Pod>(values: impl ExactSizeIterator<Item = (T, bool)>) -> Vec<T> {
     kept
 }
 
-/// Returns triangles with corners of four bytes, and room for those of the seam.
-fn widened(short: &[[u16; 3]]) -> Vec<[u32; 3]> {
-    let mut triangles = Vec::with_capacity(with_room(short.len()));
-    let mut piece = [[0u32; 3]; PIECE];
-    for short in short.chunks(PIECE) {
-        // As flat numbers, which vector instructions widen.
-        for (corner, &short) in piece.as_flattened_mut().iter_mut().zip(short.as_flattened()) {
-            *corner = short.into();
-        }
-        triangles.extend_from_slice(&piece[..short.len()]);
-    }
-    triangles
-}
-
 /// Returns a capacity with room for what a seam adds to so many vertices or triangles. If it adds more, the column is copied once.
 fn with_room(count: usize) -> usize {
     count + count / 16
-}
-
-fn has_short_corners(sites: usize) -> bool {
-    sites <= 1 << 16
 }
 
 /// What a leaf knows of its frontier before the seams are known; each column is in the order of the sites of its frontier.
@@ -308,7 +279,7 @@ impl PartialNormals {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<RecordRef> {
+    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<()> {
         let columns = ColumnWriter::default().push(&self.sums).push(&self.rgb).push(&self.class);
         push_unless_empty(columns, &self.intensity).write(store, StepRecord::PartialNormals(tile))
     }
@@ -362,7 +333,7 @@ impl FinishedBorder {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<RecordRef> {
+    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<()> {
         let columns = ColumnWriter::default().push(&self.vertices);
         push_unless_empty(columns, &self.intensity).write(store, StepRecord::FinishedBorder(tile))
     }
@@ -409,7 +380,7 @@ impl TileSummary {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<RecordRef> {
+    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<()> {
         ColumnWriter::default().push(&[*self]).write(store, StepRecord::Tile(tile))
     }
 
@@ -444,7 +415,7 @@ impl LevelSummary {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<RecordRef> {
+    pub fn save(&self, store: &Store, node: NodeIndex) -> Result<()> {
         ColumnWriter::default().push(&[self.own]).push(&self.leaves).write(store, StepRecord::Level(node))
     }
 
@@ -470,12 +441,6 @@ mod tests {
         fn marked_values_stay_in_order(values in prop::collection::vec((any::<[u16; 3]>(), any::<bool>()), 0..5 * PIECE)) {
             let expected: Vec<_> = values.iter().filter(|(_, is_marked)| *is_marked).map(|(value, _)| *value).collect();
             prop_assert_eq!(marked(values.into_iter()), expected);
-        }
-
-        #[test]
-        fn widened_triangles_have_the_same_corners(short in prop::collection::vec(any::<[u16; 3]>(), 0..3 * PIECE)) {
-            let expected: Vec<[u32; 3]> = short.iter().map(|t| t.map(u32::from)).collect();
-            prop_assert_eq!(widened(&short), expected);
         }
     }
 }

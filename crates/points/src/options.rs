@@ -165,9 +165,9 @@ impl InputOptions {
         (!is_open).then(|| "surface and returns choose different returns: leave out one of both keys".into())
     }
 
-    /// Tells whether the job needs the numbers of points: to know which was read first, or which came from a file that proved bad.
+    /// Tells whether the job needs the numbers of points, to know which was read first.
     pub fn needs_numbers(&self) -> bool {
-        self.duplicates == Duplicates::First || self.on_bad_file == OnBadFile::Skip
+        self.duplicates == Duplicates::First
     }
 
     /// Returns which rows of a text the job wants, and which `fields` of them.
@@ -391,13 +391,13 @@ mod tests {
     }
 
     #[test]
-    fn points_have_numbers_where_their_order_decides_or_their_file_may_be_left_out() {
+    fn points_have_numbers_where_their_order_decides() {
         for (text, needed) in [
             ("", false),
             ("duplicates = \"lowest\"", false),
             ("duplicates = \"highest\"\non_bad_file = \"stop\"", false),
             ("duplicates = \"first\"", true),
-            ("on_bad_file = \"skip\"", true),
+            ("on_bad_file = \"skip\"", false),
         ] {
             let options: InputOptions = toml::from_str(&format!("files = [\"a\"]\n{text}")).unwrap();
             assert_eq!(options.needs_numbers(), needed, "{text}");

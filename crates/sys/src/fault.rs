@@ -33,7 +33,7 @@ const EIO: i32 = 5;
 
 #[cfg(feature = "remote")]
 pub use injection::network_timeout;
-pub use injection::{commit_interval, is_due, is_signalled, mark, processors, traced};
+pub use injection::{is_due, is_signalled, mark, processors, syncs_always, traced};
 
 #[cfg(feature = "fault-injection")]
 mod injection {
@@ -43,6 +43,7 @@ mod injection {
     use std::path::Path;
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::sync::{LazyLock, Mutex, PoisonError};
+    #[cfg(feature = "remote")]
     use std::time::Duration;
 
     /// `GDT_FAULT=name:n` makes the process fail when it comes to the place of that name for the n-th time; `name:n+` also at every
@@ -78,9 +79,9 @@ mod injection {
         REQUESTED.is_some() && is_due(&format!("signal-{}", file.display()))
     }
 
-    /// Returns the least time between two commits of the journal if a test sets it (`GDT_COMMIT_MS`).
-    pub fn commit_interval() -> Option<Duration> {
-        std::env::var("GDT_COMMIT_MS").ok()?.parse().ok().map(Duration::from_millis)
+    /// Tells whether a test wants young jobs to wait for the disk as often as long ones (`GDT_SYNC`).
+    pub fn syncs_always() -> bool {
+        std::env::var_os("GDT_SYNC").is_some()
     }
 
     /// Returns how long servers may be silent if a test sets it (`GDT_TIMEOUT_MS`).
@@ -145,10 +146,10 @@ mod injection {
         false
     }
 
-    /// The usual time.
+    /// They do not.
     #[inline(always)]
-    pub fn commit_interval() -> Option<Duration> {
-        None
+    pub fn syncs_always() -> bool {
+        false
     }
 
     #[cfg(feature = "remote")]

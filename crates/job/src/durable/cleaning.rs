@@ -17,17 +17,18 @@ use sys::{Error, Result, disk, fault};
 /// [`Error::Io`] if a file cannot be removed.
 pub fn remove_job(directory: &JobDirectory) -> Result<()> {
     let (job, lock) = (directory.job(), lock_file(directory.job()));
-    let steps = [&directory.store()[..], &[directory.points()]].concat();
     let last = [directory.plan(), directory.journal()];
     // Notes go first: without the journal, they would say that the job is still to be done.
     for path in entries(job)? {
-        if path != lock && !steps.contains(&path) && !last.contains(&path) && !is_folder(&path)? {
+        if path != lock && !last.contains(&path) && !is_folder(&path)? {
             remove(&path)?;
         }
     }
     sync(job)?;
     // In parallel, because the system takes a while to free the cache of large files.
-    steps.par_iter().try_for_each(|file| remove(file))?;
+    let parts = [entries(&directory.parts())?, entries(&directory.points_by_part())?].concat();
+    let files = parts.iter().map(|part| entries(part)).collect::<Result<Vec<_>>>()?.concat();
+    files.par_iter().try_for_each(|file| remove(file))?;
     last.iter().try_for_each(|file| remove(file))?;
     for folder in [directory.output().directory(), &directory.parts(), &directory.points_by_part(), job] {
         entries(folder)?.iter().try_for_each(|path| remove_folder(path))?;

@@ -4,7 +4,7 @@
 //! are aligned in the file, and slices of it can be used as they are.
 
 use crate::durable::mapped::MappedSlice;
-use crate::durable::store::{RecordKey, RecordPlace, RecordRef, Store};
+use crate::durable::store::{RecordKey, RecordPlace, Store};
 use bytemuck::Pod;
 use sys::{Error, Result};
 
@@ -29,7 +29,7 @@ impl<'a> ColumnWriter<'a> {
     ///
     /// # Errors
     /// [`Error::Io`] if writing fails.
-    pub fn write<K: RecordKey>(self, store: &Store<K>, key: K) -> Result<RecordRef<K>> {
+    pub fn write<K: RecordKey>(self, store: &Store<K>, key: K) -> Result<()> {
         let padding = |bytes: &[u8]| &[0; ALIGNMENT][..bytes.len().next_multiple_of(ALIGNMENT) - bytes.len()];
         let pieces = self.columns.iter().flat_map(|(length, bytes)| [&length[..], bytes, padding(bytes)]);
         store.put(key, &pieces.collect::<Vec<&[u8]>>())

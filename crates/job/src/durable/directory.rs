@@ -1,6 +1,6 @@
 //! The job directory, which holds everything that a job needs to go on, and the results beside it.
 
-use crate::durable::atomic_file::{create_folder, remove_file};
+use crate::durable::atomic_file::remove_file;
 use crate::durable::listing::{Leftovers, entries, is_folder, is_page_of_others};
 use crate::durable::lock::{Lock, lock_file};
 use crate::durable::replacement::Replacement;
@@ -20,16 +20,7 @@ pub struct JobDirectory {
     results: OutputFiles,
     waiting: OutputFiles,
     job: PathBuf,
-    points: PointPlace,
-}
-
-/// Where the points are between reading and triangulating.
-#[derive(Clone, Debug)]
-enum PointPlace {
-    /// In one file.
-    File(PathBuf),
-    /// In a folder, with a file for each reader.
-    Folder(PathBuf),
+    points: PathBuf,
 }
 
 impl JobDirectory {
@@ -39,7 +30,7 @@ impl JobDirectory {
         let job = results.job();
         JobDirectory {
             waiting: OutputFiles::new(&job.join("results")),
-            points: PointPlace::File(job.join("points")),
+            points: job.join("points-by-part"),
             job,
             results,
         }
@@ -47,7 +38,7 @@ impl JobDirectory {
 
     /// Returns the directory in which a part of the job keeps its steps. Its results are those of the job.
     pub fn part(&self, part: PartIndex) -> JobDirectory {
-        let points = PointPlace::Folder(self.points_by_part().join(part.to_string()));
+        let points = self.points_by_part().join(part.to_string());
         JobDirectory { job: self.parts().join(part.to_string()), points, ..self.clone() }
     }
 
@@ -101,23 +92,19 @@ impl JobDirectory {
         self.job.join("raster.blocks")
     }
 
-    /// Returns the path of the journal of finished steps.
+    /// Returns the path of the journal of complete phases.
     pub fn journal(&self) -> PathBuf {
         self.job.join("journal")
     }
 
-    /// Returns the path of the file or the folder that holds the points between reading and triangulating.
-    pub fn points(&self) -> PathBuf {
-        let (PointPlace::File(path) | PointPlace::Folder(path)) = &self.points;
-        path.clone()
+    /// Returns the folder that holds the points of a part between reading and triangulating, in a file for each reader.
+    pub fn points(&self) -> &Path {
+        &self.points
     }
 
-    /// Returns the path of the point file with this number: that of the reader, in a job of several parts.
+    /// Returns the path of the point file with this number: that of the reader.
     pub fn point_file(&self, number: u16) -> PathBuf {
-        match &self.points {
-            PointPlace::File(path) => path.clone(),
-            PointPlace::Folder(folder) => folder.join(format!("{number}.points")),
-        }
+        self.points.join(format!("{number}.points"))
     }
 
     /// Returns the numbers and the paths of all point files.
@@ -126,12 +113,7 @@ impl JobDirectory {
     /// [`Error::Io`] if they cannot be listed.
     pub fn point_files(&self) -> Result<Vec<(u16, PathBuf)>> {
         let number = |path: &Path| path.file_name()?.to_str()?.strip_suffix(".points")?.parse().ok();
-        match &self.points {
-            PointPlace::File(path) => Ok(vec![(0, path.clone())]),
-            PointPlace::Folder(folder) => {
-                Ok(entries(folder)?.into_iter().filter_map(|path| Some((number(&path)?, path))).collect())
-            }
-        }
+        Ok(entries(&self.points)?.into_iter().filter_map(|path| Some((number(&path)?, path))).collect())
     }
 
     /// Removes the points.
@@ -139,10 +121,7 @@ impl JobDirectory {
     /// # Errors
     /// [`Error::Io`] if they cannot be removed.
     pub fn remove_points(&self) -> Result<()> {
-        match &self.points {
-            PointPlace::File(path) => remove_file(path),
-            PointPlace::Folder(folder) => disk::remove_tree(folder).map_err(Error::io("remove", folder)),
-        }
+        disk::remove_tree(&self.points).map_err(Error::io("remove", &self.points))
     }
 
     /// Looks at what is in this folder. A network file system that remembers what was not there is right from then on.
@@ -199,7 +178,7 @@ impl JobDirectory {
         Lock::share(&self.job)
     }
 
-    /// Takes the lock, removes everything that an interrupted run left, and makes the folder of the tiles.
+    /// Takes the lock, and removes everything that an interrupted run left.
     ///
     /// # Errors
     /// As [`JobDirectory::lock`] and [`JobDirectory::clear`].
@@ -211,23 +190,16 @@ impl JobDirectory {
     }
 
     /// Removes what an earlier run left for its steps, and the results that wait, except the files that `keep` names as the journal
-    /// does. Makes the folder of the tiles.
+    /// does.
     ///
     /// # Errors
-    /// [`Error::Io`] if a file cannot be removed or the folder cannot be made.
+    /// [`Error::Io`] if a file cannot be removed.
     pub fn clear(&self, keep: &HashSet<PathBuf>) -> Result<()> {
         let mut results = Leftovers::of(&self.waiting)?.files;
         results.retain(|path| !keep.contains(&self.name(path)));
         results.iter().try_for_each(|path| remove_file(path))?;
-        self.clear_own(keep)?;
-        create_folder(&self.waiting.tiles())
-    }
-
-    /// Removes what an earlier run left for its steps in this folder, except the files that `keep` names as the journal does.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if a file cannot be removed.
-    pub fn clear_own(&self, keep: &HashSet<PathBuf>) -> Result<()> {
+        let folders = [self.parts(), self.points_by_part(), self.join().job];
+        folders.iter().try_for_each(|folder| disk::remove_tree(folder).map_err(Error::io("remove", folder)))?;
         let stays = [self.journal(), lock_file(&self.job)];
         // All names go, because other versions of the program use other names.
         for path in entries(&self.job)? {
@@ -236,15 +208,6 @@ impl JobDirectory {
             }
         }
         Ok(())
-    }
-
-    /// Removes what a job of several parts keeps besides the job's own files.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if a file cannot be removed.
-    pub fn clear_parts(&self) -> Result<()> {
-        let folders = [self.parts(), self.points_by_part(), self.join().job];
-        folders.iter().try_for_each(|folder| disk::remove_tree(folder).map_err(Error::io("remove", folder)))
     }
 
     /// Puts the results with these `names`, which wait, in the place of the results of an earlier job. Goes on where an earlier call
@@ -308,6 +271,7 @@ mod tests {
         write_list(directory.results(), &["tiles/000007.glb"]);
         drop(directory.create().unwrap());
         assert!(theirs.iter().all(|path| path.exists()) && old.exists());
+        fs::create_dir_all(directory.output().directory()).unwrap();
         fs::write(directory.output().report(), "{}").unwrap();
         directory.replace_results(&names(&["report.json"])).unwrap();
         assert!(theirs.iter().all(|path| path.exists()));
@@ -414,7 +378,7 @@ mod tests {
         let output = tempfile::tempdir().unwrap();
         let directory = JobDirectory::new(output.path());
         let _lock = directory.create().unwrap();
-        fs::create_dir_all(directory.results().tiles()).unwrap();
+        [directory.output(), directory.results()].iter().for_each(|folder| fs::create_dir_all(folder.tiles()).unwrap());
         for (folder, text) in [(directory.output(), "new"), (directory.results(), "theirs")] {
             fs::write(folder.tile(0), text).unwrap();
         }

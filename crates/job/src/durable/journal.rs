@@ -1,14 +1,14 @@
-//! The journal of a job: a line for every finished step, with the places, sizes and hashes of what it wrote and its figures for the
-//! report. An interrupted job goes on from its journal.
+//! The journal of a job, or of a part of it: what every phase that is complete has changed in the store, the sizes and checksums of its
+//! results, and its figures. An interrupted job goes on from its journals.
 //!
-//! A line is the XXH3 of its text, a blank, and the text, which is JSON. The first line is a header that says what the job is.
-//! Everything from the first damaged line on counts as never written. The job says what its header, its steps (`S`) and its
+//! A line is the XXH3 of its text, a blank, and the text, which is JSON. The first line is a header that says what the job is. Each of the
+//! others has the phases that became complete at one time.
+//! Everything from the first damaged line on counts as never written. The job says what its header, its phases (`S`) and its
 //! records (`K`) are.
 
 use crate::durable::atomic_file::{PendingFile, publish, write_pending_lines};
-use crate::durable::committer::{CommitBatch, Committer};
 use crate::durable::directory::JobDirectory;
-use crate::durable::store::{RecordKey, RecordRef};
+use crate::durable::store::{RecordChanges, RecordKey, RecordRef};
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
@@ -16,45 +16,28 @@ use std::collections::{HashMap, HashSet};
 use std::fmt::Debug;
 use std::fs::File;
 use std::hash::Hash;
-use std::io::{BufRead, BufReader, ErrorKind};
-use std::marker::PhantomData;
+use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
-use sys::{Error, Result, fault, interrupt};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use sys::disk::WriteFrom;
+use sys::{Error, Result, disk, fault, interrupt};
 use tiles::checksums::Checksum;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// What the job calls its steps.
+/// What the job calls its phases.
 pub trait StepKey: Copy + Debug + Eq + Hash + Send + Sync + Serialize + DeserializeOwned {}
 
-/// What a finished step gives back.
-#[derive(Debug)]
-pub struct StepOutput<T, K> {
-    /// Its figures for the report.
-    pub stats: T,
-    /// The records that it wrote for later steps.
-    pub records: Vec<RecordRef<K>>,
-    /// The results of the job that it wrote.
-    pub files: Vec<PendingFile>,
-}
-
-impl<T, K> StepOutput<T, K> {
-    /// The output of a step that writes no result of the job.
-    pub fn new(stats: T, records: Vec<RecordRef<K>>) -> StepOutput<T, K> {
-        StepOutput { stats, records, files: Vec::new() }
-    }
-}
-
-/// A line of the journal: a finished step.
+/// A phase that is complete.
 #[derive(Debug, Serialize, Deserialize)]
+#[serde(bound(serialize = "S: Serialize, K: Serialize", deserialize = "S: DeserializeOwned, K: DeserializeOwned"))]
 pub struct JournalEntry<S, K> {
-    /// Which step.
+    /// Which phase.
     pub step: S,
-    /// Its records in the store.
-    pub records: Vec<RecordRef<K>>,
+    /// What it has changed in the store.
+    pub changes: RecordChanges<K>,
     /// Its results.
     pub files: Vec<PublishedFile>,
-    stats: Box<RawValue>,
+    figures: Box<RawValue>,
 }
 
 /// A published file as the journal knows it.
@@ -101,27 +84,30 @@ impl PublishedFile {
 }
 
 impl<S: StepKey, K: RecordKey> JournalEntry<S, K> {
-    fn new<T: Serialize>(directory: &JobDirectory, step: S, output: &StepOutput<T, K>) -> Result<JournalEntry<S, K>> {
-        let stats = serde_json::value::to_raw_value(&output.stats).map_err(unwritable)?;
-        let files = output.files.iter().map(|file| PublishedFile::of(directory, file)).collect();
-        Ok(JournalEntry { step, records: output.records.clone(), files, stats })
-    }
-
-    /// Returns the figures of the step.
+    /// Returns the figures of the phase.
     ///
     /// # Errors
-    /// [`Error::Broken`] if they are those of another kind of step.
-    pub fn stats<T: DeserializeOwned>(&self) -> Result<T> {
-        figures(self.step, &self.stats)
+    /// [`Error::Broken`] if they are those of another kind of phase.
+    pub fn figures<T: DeserializeOwned>(&self) -> Result<T> {
+        serde_json::from_str(self.figures.get())
+            .map_err(|e| Error::Broken(format!("the journal: {:?}: {e}", self.step)))
     }
 }
 
-fn figures<T: DeserializeOwned>(step: impl Debug, stats: &RawValue) -> Result<T> {
-    serde_json::from_str(stats.get()).map_err(|e| Error::Broken(format!("the journal: {step:?}: {e}")))
+/// Returns the records that are there after these phases.
+pub fn records_of<'a, S: 'a, K: RecordKey + 'a>(
+    entries: impl IntoIterator<Item = &'a JournalEntry<S, K>>,
+) -> HashMap<K, RecordRef<K>> {
+    let mut records = HashMap::new();
+    for JournalEntry { changes, .. } in entries {
+        changes.dropped.iter().for_each(|record| _ = records.remove(&record.key()));
+        records.extend(changes.written.iter().map(|record| (record.key(), *record)));
+    }
+    records
 }
 
 fn unwritable(error: serde_json::Error) -> Error {
-    Error::Broken(format!("the journal cannot hold a finished step: {error}"))
+    Error::Broken(format!("the journal cannot hold a phase: {error}"))
 }
 
 /// Returns `value` as a line with its checksum.
@@ -142,6 +128,8 @@ struct JournalLines {
     path: PathBuf,
     reader: BufReader<File>,
     line: Vec<u8>,
+    /// The bytes of the whole lines before the one that was read last.
+    before: u64,
 }
 
 impl JournalLines {
@@ -153,21 +141,22 @@ impl JournalLines {
             Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
             file => {
                 let file = file.map_err(Error::io("read", &path))?;
-                Ok(Some(JournalLines { path, reader: BufReader::with_capacity(BUFFER, file), line: Vec::new() }))
+                Ok(Some(JournalLines {
+                    path,
+                    reader: BufReader::with_capacity(BUFFER, file),
+                    line: Vec::new(),
+                    before: 0,
+                }))
             }
         }
     }
 
     /// Returns the value of the next line, or `None` if there is none or it is damaged.
     fn next<T: DeserializeOwned>(&mut self) -> Result<Option<T>> {
+        self.before += self.line.len() as u64;
         self.line.clear();
         self.reader.read_until(b'\n', &mut self.line).map_err(Error::io("read", &self.path))?;
-        Ok(self.again())
-    }
-
-    /// Returns the value of the line that was read last.
-    fn again<T: DeserializeOwned>(&self) -> Option<T> {
-        std::str::from_utf8(&self.line).ok().and_then(parse_line)
+        Ok(std::str::from_utf8(&self.line).ok().and_then(parse_line))
     }
 }
 
@@ -185,80 +174,37 @@ where
     S: StepKey,
     K: RecordKey,
 {
-    read_with(directory, JournalLines::next)
-}
-
-/// The step of a line.
-#[derive(Deserialize)]
-struct StepOfLine<S> {
-    step: S,
-}
-
-/// As [`read`], but returns only the entries of `wanted` steps. This is faster where there are many others.
-///
-/// # Errors
-/// [`Error::Io`] if there is a journal that cannot be read.
-pub fn read_steps<H, S, K>(directory: &JobDirectory, wanted: impl Fn(S) -> bool) -> Result<Option<ReadJournal<H, S, K>>>
-where
-    H: DeserializeOwned,
-    S: StepKey,
-    K: RecordKey,
-{
-    read_with(directory, |lines| {
-        while let Some(StepOfLine { step }) = lines.next()? {
-            if wanted(step) {
-                return Ok(lines.again());
-            }
-        }
-        Ok(None)
-    })
-}
-
-/// Reads the header, and the entries that `next` returns, until it returns none.
-fn read_with<H, S, K>(
-    directory: &JobDirectory,
-    mut next: impl FnMut(&mut JournalLines) -> Result<Option<JournalEntry<S, K>>>,
-) -> Result<Option<ReadJournal<H, S, K>>>
-where
-    H: DeserializeOwned,
-{
     let Some(mut lines) = JournalLines::open(directory)? else { return Ok(None) };
     let (header, mut entries) = (lines.next()?, Vec::new());
-    while let Some(entry) = if header.is_some() { next(&mut lines)? } else { None } {
-        entries.push(entry);
+    while let Some(mut complete) = if header.is_some() { lines.next()? } else { None } {
+        entries.append(&mut complete);
     }
     Ok(Some((header, entries)))
 }
 
-/// The step and the files of a line.
+/// The phase and the files of an entry.
 #[derive(Deserialize)]
 struct FilesOfStep<S> {
     step: S,
     files: Vec<PublishedFile>,
 }
 
-/// Calls `visit` with the steps and the files of the journal that an earlier run left, up to the first damaged line.
+/// Calls `visit` with the phases and the files of the journal that an earlier run left, up to the first damaged line.
 ///
 /// # Errors
 /// [`Error::Io`] if the journal cannot be read.
 pub fn visit_files<H, S>(directory: &JobDirectory, mut visit: impl FnMut(S, Vec<PublishedFile>)) -> Result<()>
 where
     H: DeserializeOwned,
-    S: StepKey,
+    S: DeserializeOwned,
 {
     let Some(mut lines) = JournalLines::open(directory)? else { return Ok(()) };
     if lines.next::<H>()?.is_some() {
-        while let Some(FilesOfStep { step, files }) = lines.next()? {
-            visit(step, files);
+        while let Some(entries) = lines.next::<Vec<FilesOfStep<S>>>()? {
+            entries.into_iter().for_each(|FilesOfStep { step, files }| visit(step, files));
         }
     }
     Ok(())
-}
-
-/// The files of a line, whatever its step is.
-#[derive(Deserialize)]
-struct FilesOfLine {
-    files: Vec<PublishedFile>,
 }
 
 /// Returns the names of all files in the journal that an earlier run left, up to the first damaged line.
@@ -267,132 +213,198 @@ struct FilesOfLine {
 /// [`Error::Io`] if the journal cannot be read.
 pub(crate) fn names_of_files(directory: &JobDirectory) -> Result<HashSet<PathBuf>> {
     let mut names = HashSet::new();
-    let Some(mut lines) = JournalLines::open(directory)? else { return Ok(names) };
-    if lines.next::<IgnoredAny>()?.is_some() {
-        while let Some(FilesOfLine { files }) = lines.next()? {
-            names.extend(files.into_iter().map(|file| file.name));
-        }
-    }
+    visit_files::<IgnoredAny, IgnoredAny>(directory, |_, files| names.extend(files.into_iter().map(|file| file.name)))?;
     Ok(names)
 }
 
-/// A position in the journal of a run: after a number of records. The default is the start.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct JournalPosition(u64);
+/// A phase that is to be recorded.
+pub struct NewEntry<S, K>(JournalEntry<S, K>);
+
+impl<S: StepKey, K: RecordKey> NewEntry<S, K> {
+    /// Returns the entry of `step` with its figures and what it has changed in the store.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if the figures cannot be written down.
+    pub fn new(step: S, figures: &impl Serialize, changes: RecordChanges<K>) -> Result<NewEntry<S, K>> {
+        let figures = serde_json::value::to_raw_value(figures).map_err(unwritable)?;
+        Ok(NewEntry(JournalEntry { step, changes, files: Vec::new(), figures }))
+    }
+}
 
 /// The journal of a run. Any thread may call its methods.
 pub struct Journal<'a, S, K> {
     directory: &'a JobDirectory,
-    /// The figures of the steps that an earlier run finished.
-    taken_over: HashMap<S, Box<RawValue>>,
-    /// The files of all steps that are finished, in the order in which they were recorded.
-    files: Mutex<Vec<PublishedFile>>,
-    committer: Committer,
-    records: PhantomData<fn(K)>,
+    state: Mutex<JournalState<S, K>>,
+}
+
+struct JournalState<S, K> {
+    /// The phases that are complete.
+    entries: Vec<JournalEntry<S, K>>,
+    /// The results of the phase that is under way. Those from `named` on are still to get their names.
+    files: Vec<PublishedFile>,
+    named: usize,
+    file: File,
+    end: u64,
 }
 
 impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
-    /// Begins the journal of a run that takes over the steps of `entries` from an earlier one.
+    /// Begins a journal that has these `entries` already.
     ///
     /// # Errors
-    /// [`Error::Io`] if the journal cannot be written.
+    /// [`Error::Io`] if it cannot be written.
     pub fn begin(
         directory: &'a JobDirectory,
         header: &impl Serialize,
         entries: Vec<JournalEntry<S, K>>,
     ) -> Result<Journal<'a, S, K>> {
         let path = directory.journal();
-        write_pending_lines(&path, std::iter::once(to_line(header)).chain(entries.iter().map(to_line)))?;
+        write_pending_lines(
+            &path,
+            std::iter::once(to_line(header)).chain(entries.iter().map(|entry| to_line(&[entry]))),
+        )?;
         publish(std::slice::from_ref(&path))?;
-        let (mut files, mut taken_over) = (Vec::new(), HashMap::with_capacity(entries.len()));
-        for entry in entries {
-            files.extend(entry.files);
-            taken_over.insert(entry.step, entry.stats);
-        }
-        let (files, records) = (Mutex::new(files), PhantomData);
-        Ok(Journal { directory, taken_over, files, committer: Committer::start(&path)?, records })
+        let file = disk::open(&path).map_err(Error::io("open", &path))?;
+        let end = file.metadata().map_err(Error::io("read", &path))?.len();
+        Ok(Journal::open(directory, entries, file, end))
     }
 
-    /// Tells whether an earlier run finished `step`.
-    pub fn has(&self, step: S) -> bool {
-        self.taken_over.contains_key(&step)
-    }
-
-    /// Returns the number of steps that earlier runs finished.
-    pub fn taken_over(&self) -> u64 {
-        self.taken_over.len() as u64
-    }
-
-    /// Returns the figures of `step`: those of an earlier run that finished it, or else those of `work`, which is then recorded.
+    /// Goes on with the journal in `directory`, or begins one if that is not the journal of `header`.
     ///
     /// # Errors
-    /// [`Error::Interrupted`], [`Error::Io`] on the journal, [`Error::Broken`] if the figures are those of another kind of step, and
+    /// [`Error::Io`] if it cannot be read or written.
+    pub fn go_on<H>(directory: &'a JobDirectory, header: &H) -> Result<Journal<'a, S, K>>
+    where
+        H: Serialize + DeserializeOwned + PartialEq,
+    {
+        let path = directory.journal();
+        let Some(mut lines) = JournalLines::open(directory)? else {
+            return Journal::begin(directory, header, Vec::new());
+        };
+        if lines.next::<H>()?.as_ref() != Some(header) {
+            return Journal::begin(directory, header, Vec::new());
+        }
+        let mut entries = Vec::new();
+        while let Some(mut complete) = lines.next()? {
+            entries.append(&mut complete);
+        }
+        let file = disk::open(&path).map_err(Error::io("open", &path))?;
+        // A kill may have cut the last line off.
+        disk::set_length(&file, lines.before).map_err(Error::io("write", &path))?;
+        Ok(Journal::open(directory, entries, file, lines.before))
+    }
+
+    fn open(directory: &'a JobDirectory, entries: Vec<JournalEntry<S, K>>, file: File, end: u64) -> Journal<'a, S, K> {
+        let state = JournalState { entries, files: Vec::new(), named: 0, file, end };
+        Journal { directory, state: Mutex::new(state) }
+    }
+
+    /// Returns the records that are there after all phases.
+    pub fn records(&self) -> Vec<RecordRef<K>> {
+        records_of(&self.state().entries).into_values().collect()
+    }
+
+    fn state(&self) -> MutexGuard<'_, JournalState<S, K>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the figures of `step`, if it is complete.
+    ///
+    /// # Errors
+    /// As [`JournalEntry::figures`].
+    pub fn figures_of<T: DeserializeOwned>(&self, step: S) -> Result<Option<T>> {
+        self.state().entries.iter().find(|entry| entry.step == step).map(JournalEntry::figures).transpose()
+    }
+
+    /// Returns the number of phases that are complete.
+    pub fn complete(&self) -> u64 {
+        self.state().entries.len() as u64
+    }
+
+    /// Returns the figures of `step`: those that the journal has, or else those of `work`, which is then recorded with the files that it
+    /// returns.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`], [`Error::Io`] on the journal, [`Error::Broken`] if the figures are those of another kind of phase, and
     /// the errors of `work`.
     pub fn step<T, E>(
         &self,
         step: S,
-        work: impl FnOnce() -> std::result::Result<StepOutput<T, K>, E>,
+        work: impl FnOnce() -> std::result::Result<(T, Vec<PendingFile>), E>,
     ) -> std::result::Result<T, E>
     where
         T: Serialize + DeserializeOwned,
         E: From<Error>,
     {
-        if let Some(stats) = self.taken_over.get(&step) {
-            return Ok(figures(step, stats)?);
+        if let Some(figures) = self.figures_of(step)? {
+            return Ok(figures);
         }
         interrupt::check()?;
-        Ok(self.record(step, work()?)?)
+        let (figures, files) = work()?;
+        self.add_files(&files);
+        self.record(vec![NewEntry::new(step, &figures, RecordChanges::default())?])?;
+        Ok(figures)
     }
 
-    /// Records that `step` is finished and returns its figures. Its results get their names when the record is committed, which
-    /// happens after a while or through [`Journal::commit`].
+    /// Adds results of the phase that is under way.
+    pub fn add_files(&self, files: &[PendingFile]) {
+        self.state().files.extend(files.iter().map(|file| PublishedFile::of(self.directory, file)));
+    }
+
+    /// Gives the results so far their names, once they are on the disk.
     ///
     /// # Errors
-    /// [`Error::Io`] if an earlier record could not be committed.
-    pub fn record<T: Serialize>(&self, step: S, output: StepOutput<T, K>) -> Result<T> {
-        let entry = JournalEntry::new(self.directory, step, &output)?;
-        self.files.lock().unwrap_or_else(PoisonError::into_inner).extend(entry.files.iter().cloned());
-        let files = output.files.into_iter().map(|file| file.path).collect();
-        self.committer.add(CommitBatch { lines: to_line(&entry)?, files })?;
-        Ok(output.stats)
+    /// [`Error::Io`] if that fails.
+    pub fn name_files(&self) -> Result<()> {
+        let mut state = self.state();
+        let paths: Vec<PathBuf> =
+            state.files[state.named..].iter().map(|file| self.directory.file(&file.name)).collect();
+        fault::point("commit");
+        publish(&paths)?;
+        fault::point("published");
+        state.named = state.files.len();
+        Ok(())
     }
 
-    /// Returns the files of all steps that are finished, by name.
+    /// Records phases that are complete. The results since the last record are those of the last of them; they get their names. The line is
+    /// on the disk when this returns.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if that fails.
+    pub fn record(&self, added: Vec<NewEntry<S, K>>) -> Result<()> {
+        self.name_files()?;
+        let mut state = self.state();
+        let (last, files) = (added.len() - 1, std::mem::take(&mut state.files));
+        state.named = 0;
+        let with_files = added.into_iter().enumerate().map(|(at, NewEntry(entry))| match at == last {
+            true => JournalEntry { files: files.clone(), ..entry },
+            false => entry,
+        });
+        let entries: Vec<JournalEntry<S, K>> = with_files.collect();
+        let line = to_line(&entries)?;
+        if fault::is_due("torn") {
+            // What a power failure may leave of it.
+            let _ = state.append(&line[..line.len() / 2]);
+            fault::die();
+        }
+        state.append(&line).map_err(Error::io("write", &self.directory.journal()))?;
+        state.entries.extend(entries);
+        fault::point("committed");
+        Ok(())
+    }
+
+    /// Returns the results of all phases that are complete.
     pub fn files(&self) -> Vec<PublishedFile> {
-        let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        files.sort_by(|a, b| a.name.cmp(&b.name));
-        files
+        self.state().entries.iter().flat_map(|entry| &entry.files).cloned().collect()
     }
+}
 
-    /// Waits until everything recorded is on the disk and all results have their names.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if that fails.
-    pub fn commit(&self) -> Result<()> {
-        self.committer.commit(self.committer.added())
-    }
-
-    /// Returns the position after the last record.
-    pub fn position(&self) -> JournalPosition {
-        JournalPosition(self.committer.added())
-    }
-
-    /// Waits until everything before `position` is on the disk.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if that fails.
-    pub fn commit_to(&self, position: JournalPosition) -> Result<()> {
-        self.committer.commit(position.0)
-    }
-
-    /// Tells whether the job has run for so long that it should not depend on what the system has yet to bring to the disk.
-    pub fn is_worth_syncing(&self) -> bool {
-        self.committer.is_worth_syncing()
-    }
-
-    /// Commits what can be committed, ends the journal and returns the number of finished steps in it.
-    pub fn close(self) -> u64 {
-        self.taken_over.len() as u64 + self.committer.close()
+impl<S, K> JournalState<S, K> {
+    /// Appends text and waits until it is on the disk.
+    fn append(&mut self, text: &str) -> std::io::Result<()> {
+        let mut writer = WriteFrom { file: &self.file, at: self.end };
+        writer.write_all(text.as_bytes())?;
+        self.end = writer.at;
+        disk::sync_data(&self.file)
     }
 }
 

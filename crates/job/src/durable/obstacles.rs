@@ -21,11 +21,13 @@ use tiles::checksums::read_file;
 pub fn check_nothing_in_the_way(directory: &JobDirectory) -> Result<()> {
     let (job, results, waiting) = (directory.job(), directory.results(), directory.output());
     let output = results.directory();
-    let mut own = vec![job.to_path_buf()];
+    let parts = if is_folder(&directory.parts())? { directory.folders_of_parts()? } else { Vec::new() };
+    let mut own = vec![job.to_path_buf(), directory.parts(), directory.points_by_part()];
     own.extend(results.numbered_folders().map(|(folder, _)| folder));
     let [results, waiting] = [Leftovers::of(results)?, Leftovers::of(waiting)?];
     own.extend([results.no_folders, waiting.no_folders, results.folders].concat());
-    let mut files = own_files(directory).into_iter().chain(results.files).chain(waiting.files);
+    let of_parts = parts.iter().flat_map(own_files);
+    let mut files = own_files(directory).into_iter().chain(of_parts).chain(results.files).chain(waiting.files);
     let mut folders = output.ancestors().chain(own.iter().map(PathBuf::as_path));
     let is_in_the_way = |path: &Path| Ok(is_there(path)? && !is_folder(path)?);
     let (found, what, wanted) = if let Some(found) = find(&mut folders, is_in_the_way)? {
@@ -112,7 +114,7 @@ fn names_in_journals(directory: &JobDirectory) -> Result<HashSet<PathBuf>> {
 
 /// Returns the paths of the files that the job keeps for itself, under their names or their partial names.
 fn own_files(directory: &JobDirectory) -> Vec<PathBuf> {
-    let mut files = vec![directory.journal(), directory.plan(), directory.points(), lock_file(directory.job())];
+    let mut files = vec![directory.journal(), directory.plan(), lock_file(directory.job())];
     files.extend(directory.store());
     let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
     files.extend(partials);

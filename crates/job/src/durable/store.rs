@@ -5,22 +5,22 @@
 //! systems. Not one file for all: threads would wait for each other while they write, and one thread would free the whole file at
 //! the end while the others idle.
 //!
-//! The journal knows where each record is and the hash of its bytes. So a store can be opened again after a kill, whatever the kill
-//! left behind the last known record.
+//! Each phase leaves in the journal what has changed ([`Store::take_changes`]): where each record is, and the hash of its bytes. So a store
+//! can be opened again after a kill, whatever the kill left behind the last known record.
 
 use crate::durable::directory::STORE_FILES;
 use crate::durable::mapped::MappedSlice;
 use bytemuck::Pod;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Debug;
 use std::fs::File;
 use std::hash::Hash;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{PoisonError, RwLock};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 use sys::disk::WriteFrom;
 use sys::positional_io::read_exact_at;
 use sys::{Error, Result, disk, fault};
@@ -69,13 +69,51 @@ impl<K: RecordKey> RecordRef<K> {
     pub(crate) fn key(&self) -> K {
         self.key
     }
+
+    fn place(&self) -> RecordPlace {
+        RecordPlace { at: self.at, length: self.length }
+    }
+}
+
+/// What has become of the records of a store since its journal was told.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct RecordChanges<K> {
+    /// The records that were written, and are still there.
+    pub(crate) written: Vec<RecordRef<K>>,
+    /// Those that the journal knows, and that are given up. The disk gets their space back once the journal knows this too.
+    pub(crate) dropped: Vec<RecordRef<K>>,
+}
+
+impl<K> Default for RecordChanges<K> {
+    fn default() -> RecordChanges<K> {
+        RecordChanges { written: Vec::new(), dropped: Vec::new() }
+    }
 }
 
 /// The results of all steps of a job, on disk. Several threads may write and read at the same time.
 #[derive(Debug)]
 pub struct Store<K> {
     files: Vec<StoreFile>,
-    places: RwLock<HashMap<K, RecordPlace>>,
+    records: RwLock<Records<K>>,
+    /// The bytes of all records that did not go back to the disk, and the most that there were at any time.
+    bytes: AtomicU64,
+    peak: AtomicU64,
+}
+
+#[derive(Debug)]
+struct Records<K> {
+    /// All records.
+    known: HashMap<K, RecordRef<K>>,
+    /// Those that the journal does not know yet.
+    written: HashSet<K>,
+    /// Those that are given up, which the journal still knows.
+    dropped: Vec<RecordRef<K>>,
+}
+
+impl<K> Default for Records<K> {
+    fn default() -> Records<K> {
+        Records { known: HashMap::new(), written: HashSet::new(), dropped: Vec::new() }
+    }
 }
 
 #[derive(Debug)]
@@ -83,51 +121,59 @@ struct StoreFile {
     path: PathBuf,
     file: File,
     end: AtomicU64,
-    /// The bytes that were given back to the disk.
-    freed: AtomicU64,
 }
 
 impl<K: RecordKey> Store<K> {
-    /// Creates an empty store in files at `paths`.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if a file cannot be made.
-    pub fn create(paths: [PathBuf; STORE_FILES]) -> Result<Store<K>> {
-        let create = |path: PathBuf| {
-            let file = disk::create(&path).map_err(Error::io("create", &path))?;
-            Ok(StoreFile { file, path, end: AtomicU64::new(0), freed: AtomicU64::new(0) })
-        };
-        let files = paths.into_iter().map(create).collect::<Result<_>>()?;
-        Ok(Store { files, places: RwLock::default() })
-    }
-
     /// Opens the store in the files at `paths` with the given records; new records overwrite everything else in it.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be opened.
-    pub fn open<'a>(paths: [PathBuf; STORE_FILES], records: impl Iterator<Item = &'a RecordRef<K>>) -> Result<Store<K>>
-    where
-        K: 'a,
-    {
-        let (mut ends, mut places) = ([0; STORE_FILES], HashMap::new());
-        for &RecordRef { key, at, length, .. } in records {
-            places.insert(key, RecordPlace { at, length });
-            let end = &mut ends[file_index(key)];
-            *end = (at + length).max(*end);
+    pub fn open(paths: [PathBuf; STORE_FILES], records: impl IntoIterator<Item = RecordRef<K>>) -> Result<Store<K>> {
+        let known: HashMap<K, RecordRef<K>> = records.into_iter().map(|record| (record.key, record)).collect();
+        let mut ends = [0; STORE_FILES];
+        for record in known.values() {
+            let end = &mut ends[file_index(record.key)];
+            *end = (record.at + record.length).max(*end);
         }
         let open = |(path, end): (PathBuf, u64)| {
             // If a file is missing, only its own records are lost.
             let file = disk::open_or_create(&path).map_err(Error::io("open", &path))?;
-            Ok(StoreFile { path, file, end: AtomicU64::new(end), freed: AtomicU64::new(0) })
+            Ok(StoreFile { path, file, end: AtomicU64::new(end) })
         };
         let files = paths.into_iter().zip(ends).map(open).collect::<Result<_>>()?;
-        Ok(Store { files, places: RwLock::new(places) })
+        let bytes = known.values().map(|record| record.length).sum();
+        let records = RwLock::new(Records { known, ..Records::default() });
+        Ok(Store { files, records, bytes: AtomicU64::new(bytes), peak: AtomicU64::new(bytes) })
     }
 
     /// Tells whether the record is there and holds what was written.
-    pub fn is_whole(&self, record: &RecordRef<K>) -> bool {
-        let place = RecordPlace { at: record.at, length: record.length };
-        self.hash(record.key, place).is_ok_and(|hash| hash == record.hash)
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the disk does not tell.
+    pub fn is_whole(&self, record: &RecordRef<K>) -> Result<bool> {
+        match self.hash(record.key, record.place()) {
+            Err(Error::Io { source, .. }) if source.kind() == ErrorKind::UnexpectedEof => Ok(false),
+            hash => Ok(hash? == record.hash),
+        }
+    }
+
+    /// Tells whether there is a record of `key` that holds what was written.
+    ///
+    /// # Errors
+    /// As [`Store::is_whole`].
+    pub fn has_whole(&self, key: K) -> Result<bool> {
+        let record = self.records().known.get(&key).copied();
+        record.map_or(Ok(false), |record| self.is_whole(&record))
+    }
+
+    /// Returns what has become of the records since this was called last, for the journal.
+    pub fn take_changes(&self) -> RecordChanges<K> {
+        let mut records = self.records.write().unwrap_or_else(PoisonError::into_inner);
+        let mut written: Vec<RecordRef<K>> =
+            std::mem::take(&mut records.written).iter().filter_map(|key| records.known.get(key).copied()).collect();
+        // The journal must not depend on the order of a hash set.
+        written.sort_unstable_by_key(|record| (file_index(record.key), record.at));
+        RecordChanges { written, dropped: std::mem::take(&mut records.dropped) }
     }
 
     /// Waits until all records are on the disk.
@@ -155,7 +201,7 @@ impl<K: RecordKey> Store<K> {
     }
 
     /// Writes a record, given in pieces. It replaces an earlier record of the same key.
-    pub(crate) fn put(&self, key: K, pieces: &[&[u8]]) -> Result<RecordRef<K>> {
+    pub(crate) fn put(&self, key: K, pieces: &[&[u8]]) -> Result<()> {
         let length = pieces.iter().map(|piece| piece.len() as u64).sum();
         let store = self.file(key);
         let at = store.end.fetch_add(length, Ordering::Relaxed);
@@ -168,25 +214,29 @@ impl<K: RecordKey> Store<K> {
         };
         let written = pieces.iter().try_for_each(&mut write).and_then(|()| writer.flush());
         written.map_err(Error::io("write", &store.path))?;
-        let mut places = self.places.write().unwrap_or_else(PoisonError::into_inner);
-        places.insert(key, RecordPlace { at, length });
-        Ok(RecordRef { key, at, length, hash: hasher.digest() })
+        let record = RecordRef { key, at, length, hash: hasher.digest() };
+        let mut records = self.records.write().unwrap_or_else(PoisonError::into_inner);
+        records.known.insert(key, record);
+        records.written.insert(key);
+        drop(records);
+        let bytes = self.bytes.fetch_add(length, Ordering::Relaxed) + length;
+        self.peak.fetch_max(bytes, Ordering::Relaxed);
+        Ok(())
+    }
+
+    fn records(&self) -> RwLockReadGuard<'_, Records<K>> {
+        self.records.read().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns where the record of `key` is.
     pub(crate) fn place(&self, key: K) -> Result<RecordPlace> {
-        let places = self.places.read().unwrap_or_else(PoisonError::into_inner);
-        places.get(&key).copied().ok_or_else(|| Error::Broken(format!("{} has no {key:?}", self.path(key).display())))
+        let record = self.records().known.get(&key).map(RecordRef::place);
+        record.ok_or_else(|| Error::Broken(format!("{} has no {key:?}", self.path(key).display())))
     }
 
     /// Tells whether there is a record of `key`.
     pub fn has(&self, key: K) -> bool {
         self.place(key).is_ok()
-    }
-
-    /// Returns the bytes of the record of `key`; 0 if there is none.
-    pub fn length(&self, key: K) -> u64 {
-        self.place(key).map_or(0, |place| place.length)
     }
 
     /// Reads `count` values from byte `at` of the file of `key` on.
@@ -206,25 +256,45 @@ impl<K: RecordKey> Store<K> {
         Ok(values)
     }
 
-    /// Gives the space of the record of `key` back to the disk. From then on there is no such record.
+    /// Gives the record of `key` up, if there is one. Its space goes back to the disk at once, unless the journal knows the record: then
+    /// [`Store::give_back`] does it.
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.
     pub fn free(&self, key: K) -> Result<()> {
-        let place = self.places.write().unwrap_or_else(PoisonError::into_inner).remove(&key);
-        let Some(RecordPlace { at, length }) = place else { return Ok(()) };
-        let store = self.file(key);
-        // Only whole pages can be freed.
-        let pages = at.next_multiple_of(PAGE)..(at + length) / PAGE * PAGE;
-        let freed = if pages.is_empty() { Ok(0) } else { disk::free(&store.file, &[pages]) };
-        store.freed.fetch_add(freed.map_err(Error::io("write", &store.path))?, Ordering::Relaxed);
+        let mut records = self.records.write().unwrap_or_else(PoisonError::into_inner);
+        let Some(record) = records.known.remove(&key) else { return Ok(()) };
+        if records.written.remove(&key) {
+            drop(records);
+            return self.give_back(&[record]);
+        }
+        records.dropped.push(record);
         Ok(())
     }
 
-    /// Returns the number of bytes of all records that were not freed.
+    /// Gives the space of records that were given up back to the disk.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if that fails.
+    pub fn give_back(&self, dropped: &[RecordRef<K>]) -> Result<()> {
+        for &RecordRef { key, at, length, .. } in dropped {
+            let store = self.file(key);
+            // Only whole pages can be freed.
+            let pages = at.next_multiple_of(PAGE)..(at + length) / PAGE * PAGE;
+            let freed = if pages.is_empty() { Ok(0) } else { disk::free(&store.file, &[pages]) };
+            self.bytes.fetch_sub(freed.map_err(Error::io("write", &store.path))?, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+
+    /// Returns the most bytes that all records took at any time since the store was opened.
+    pub fn peak(&self) -> u64 {
+        self.peak.load(Ordering::Relaxed)
+    }
+
+    /// Returns the number of bytes of all records that did not go back to the disk.
     pub fn bytes(&self) -> u64 {
-        let bytes = |store: &StoreFile| store.end.load(Ordering::Relaxed) - store.freed.load(Ordering::Relaxed);
-        self.files.iter().map(bytes).sum()
+        self.bytes.load(Ordering::Relaxed)
     }
 
     /// Returns the path of the file that the record of `key` is in, or would be in.
@@ -255,8 +325,14 @@ mod tests {
         }
     }
 
+    /// Writes a record and returns it as the journal learns of it.
     fn put(store: &Store<Key>, key: Key, values: &[u32]) -> RecordRef<Key> {
-        ColumnWriter::default().push(values).write(store, key).unwrap()
+        ColumnWriter::default().push(values).write(store, key).unwrap();
+        store.take_changes().written[0]
+    }
+
+    fn create(folder: &Path) -> Store<Key> {
+        Store::open(paths(folder), []).unwrap()
     }
 
     fn get(store: &Store<Key>, key: Key) -> Result<Vec<u32>> {
@@ -270,7 +346,7 @@ mod tests {
     #[test]
     fn records_are_dealt_out_to_all_files() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::create(paths(folder.path())).unwrap();
+        let store = create(folder.path());
         (0..STORE_FILES).for_each(|tile| _ = put(&store, Key::Leaf(tile), &[1]));
         let lengths = paths(folder.path()).map(|path| path.metadata().unwrap().len());
         // The number of values, one value, and twelve bytes of padding.
@@ -281,7 +357,7 @@ mod tests {
     #[test]
     fn columns_of_any_length_and_type_come_back() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::<Key>::create(paths(folder.path())).unwrap();
+        let store = create(folder.path());
         for length in [0, 1, 2, 3, 5, 10_000, 30_001] {
             let (bytes, words): (Vec<u8>, Vec<u128>) = (0..length).map(|i| (i as u8, i as u128 * 3)).unzip();
             let triples: Vec<[u16; 3]> = (0..length).map(|i| [i as u16; 3]).collect();
@@ -302,7 +378,7 @@ mod tests {
     fn a_record_that_is_cut_or_changed_is_not_whole() {
         let folder = tempfile::tempdir().unwrap();
         let paths = paths(folder.path());
-        let store = Store::create(paths.clone()).unwrap();
+        let store = create(folder.path());
         // One after the other in one file.
         let key = |i: usize| Key::Leaf(3 + i * STORE_FILES);
         let stored: Vec<RecordRef<Key>> = (0..4).map(|i| put(&store, key(i), &vec![7; 5 * i])).collect();
@@ -313,11 +389,11 @@ mod tests {
             changed[at] ^= 0x40;
             for (content, cut) in [(&whole[..at], true), (&changed, false)] {
                 std::fs::write(path, content).unwrap();
-                let store = Store::open(paths.clone(), stored.iter()).unwrap();
+                let store = Store::open(paths.clone(), stored.clone()).unwrap();
                 for record in &stored {
                     let end = record.at + record.length;
                     let is_hit = if cut { end > at as u64 } else { (record.at..end).contains(&(at as u64)) };
-                    assert_eq!(store.is_whole(record), !is_hit, "{record:?}, byte {at}, cut: {cut}");
+                    assert_eq!(store.is_whole(record).unwrap(), !is_hit, "{record:?}, byte {at}, cut: {cut}");
                 }
             }
         }
@@ -327,29 +403,52 @@ mod tests {
     fn an_opened_store_has_the_records_it_is_told_of_and_appends_after_them() {
         let folder = tempfile::tempdir().unwrap();
         let paths = paths(folder.path());
-        let store = Store::create(paths.clone()).unwrap();
+        let store = create(folder.path());
         let kept = put(&store, Key::Border(0), &[1, 2, 3]);
         put(&store, Key::Border(1), &[4, 5, 6]);
-        let store = Store::open(paths.clone(), [kept].iter()).unwrap();
+        let store = Store::open(paths.clone(), [kept]).unwrap();
         assert!(store.place(Key::Border(0)).is_ok() && store.place(Key::Border(1)).is_err());
         let added = put(&store, Key::Seam(7), &[8]);
-        let store = Store::open(paths.clone(), [kept, added].iter()).unwrap();
+        let store = Store::open(paths.clone(), [kept, added]).unwrap();
         assert_eq!(
             (get(&store, Key::Border(0)).unwrap(), get(&store, Key::Seam(7)).unwrap()),
             (vec![1, 2, 3], vec![8])
         );
         let other = RecordRef { key: Key::Border(1), ..kept };
-        assert!(store.is_whole(&kept) && !store.is_whole(&other), "the hash depends on the key");
+        assert!(store.is_whole(&kept).unwrap() && !store.is_whole(&other).unwrap(), "the hash depends on the key");
+    }
+
+    #[test]
+    fn the_journal_is_told_of_each_change_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = create(folder.path());
+        let write = |key, value| ColumnWriter::default().push(&vec![value; 5_000]).write(&store, key).unwrap();
+        [Key::Leaf(0), Key::Leaf(1), Key::Leaf(2)].into_iter().zip(1u32..).for_each(|(key, value)| write(key, value));
+        // What the journal never knew goes at once.
+        store.free(Key::Leaf(1)).unwrap();
+        let keys = |records: &[RecordRef<Key>]| records.iter().map(RecordRef::key).collect::<Vec<_>>();
+        let RecordChanges { written, dropped } = store.take_changes();
+        assert_eq!((keys(&written), keys(&dropped)), (vec![Key::Leaf(0), Key::Leaf(2)], vec![]));
+        store.free(Key::Leaf(0)).unwrap();
+        assert!(!store.has(Key::Leaf(0)));
+        assert!(store.is_whole(&written[0]).unwrap(), "its bytes are there until the journal knows");
+        write(Key::Seam(0), 9);
+        let RecordChanges { written: added, dropped } = store.take_changes();
+        assert_eq!((keys(&added), keys(&dropped)), (vec![Key::Seam(0)], vec![Key::Leaf(0)]));
+        store.give_back(&dropped).unwrap();
+        assert_eq!(store.is_whole(&written[0]).unwrap(), cfg!(not(target_os = "linux")));
+        let RecordChanges { written, dropped } = store.take_changes();
+        assert!(written.is_empty() && dropped.is_empty());
     }
 
     #[test]
     fn a_later_record_replaces_an_earlier_one() {
         let folder = tempfile::tempdir().unwrap();
         let paths = paths(folder.path());
-        let store = Store::create(paths.clone()).unwrap();
+        let store = create(folder.path());
         let stored = [put(&store, Key::Border(3), &[1]), put(&store, Key::Border(3), &[2, 3])];
         assert_eq!(get(&store, Key::Border(3)).unwrap(), [2, 3]);
-        assert_eq!(get(&Store::open(paths.clone(), stored.iter()).unwrap(), Key::Border(3)).unwrap(), [2, 3]);
+        assert_eq!(get(&Store::open(paths.clone(), stored).unwrap(), Key::Border(3)).unwrap(), [2, 3]);
         assert!(get(&store, Key::Border(4)).unwrap_err().to_string().contains("Border(4)"));
     }
 }

@@ -1,10 +1,11 @@
 //! Step 7, once for each coarser tile: reads the meshes of its children back from their files, joins and simplifies them.
 
+use crate::durable::atomic_file::PendingFile;
 use crate::durable::directory::JobDirectory;
 use crate::index::{NodeIndex, PartIndex};
 use crate::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
 use crate::partition::tree::{NodeKind, Tree};
-use crate::records::{LevelSummary, StepOutput, Store, TileSummary};
+use crate::records::{LevelSummary, Store, TileSummary};
 use crate::tiles::style::TileStyle;
 use crate::tiles::write_tile::write_glb;
 use delaunay::geometry::Bounds;
@@ -86,7 +87,7 @@ fn seen_error(simple: &Simplified, frame: &Frame, bounds: Bounds<3>) -> f64 {
 ///
 /// # Errors
 /// [`Error::Io`] on the output or the store, [`Error::Broken`] if a file is not what an earlier step wrote.
-pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<StepOutput<LevelStats>> {
+pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<(LevelStats, Vec<PendingFile>)> {
     let coarse = &context.hierarchy.tiles[index];
     let children = coarse.children.iter().map(|&child| Child::find(context, child)).collect::<Result<Vec<_>>>()?;
     let bounds = children.iter().filter_map(|child| child.own.bounds()).reduce(Bounds::union);
@@ -114,8 +115,8 @@ pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<StepOut
         }
     }
     let leaves = children.iter().filter(|child| child.exact).map(|child| child.own).collect();
-    let record = LevelSummary { own, leaves }.save(context.store, coarse.node)?;
-    Ok(StepOutput { files, ..StepOutput::new(stats, vec![record]) })
+    LevelSummary { own, leaves }.save(context.store, coarse.node)?;
+    Ok((stats, files))
 }
 
 /// Returns the bytes of memory that making coarser tile `index` takes, whose children must exist: 0 if it is left out.

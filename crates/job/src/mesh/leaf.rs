@@ -10,7 +10,7 @@ use crate::mesh::sites::load_sites;
 use crate::partition::point_file::PointFiles;
 use crate::partition::result::Partition;
 use crate::plan::job_plan::Plan;
-use crate::records::{BorderVertex, Leaf, PartialNormals, StepOutput, Store};
+use crate::records::{BorderVertex, Leaf, PartialNormals, Store};
 use delaunay::geometry::Site;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::mesh::index::{HalfEdgeIndex, SiteIndex};
@@ -61,7 +61,7 @@ pub fn triangulate_leaf(
     store: &Store,
     triangulator: &Triangulator,
     tile: TileIndex,
-) -> crate::Result<StepOutput<LeafStats>> {
+) -> crate::Result<LeafStats> {
     let (points, duplicates) = load_sites(points, &partition.blocks[tile.get()], plan.options.input.duplicates)?;
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
     let (mesh, outcome) = triangulator.triangulate(&sites)?;
@@ -72,21 +72,22 @@ pub fn triangulate_leaf(
     let normals = partial_normals(&mesh, &found, &points);
     let corners = mesh.corners().iter().zip(&found.states);
     let triangles = corners.map(|(triangle, state)| (*triangle, *state == TriangleState::Final));
-    let (leaf, triangles) = Leaf::save(store, tile, &points, triangles)?;
+    let triangles = Leaf::save(store, tile, &points, triangles)?;
     let vertex = |&site: &SiteIndex| BorderVertex { tile, site, position: points[site.get()].corner() };
     let is_root = cell.is_none();
     let node_mesh = NodeMesh { mesh: &mesh, sites: &sites, found: &found, rule: HullRule::of(plan), is_root };
     let NodeFlows { passes, questions, trimmed, slivers } = flows_of_leaf(&node_mesh, tile)?;
     let border = found.frontier.iter().map(vertex).collect();
     let frontier = Frontier { sites: border, boundary: found.boundary, passes, questions, triangles };
-    let mut records = vec![normals.save(store, tile)?, leaf, frontier.save(store, node)?];
+    normals.save(store, tile)?;
+    frontier.save(store, node)?;
     if is_root {
         // No merge answers what this tile asks.
-        records.push(Seam::new(&[], trimmed, HullCount { slivers, triangles }).save(store, node)?);
+        Seam::new(&[], trimmed, HullCount { slivers, triangles }).save(store, node)?;
     }
     triangulation::recycle(mesh);
     let vertices = VertexDigest::of(points.iter().map(Point::corner));
-    Ok(StepOutput::new(LeafStats { sites: sites.len() as u64, duplicates, triangles, vertices, outcome }, records))
+    Ok(LeafStats { sites: sites.len() as u64, duplicates, triangles, vertices, outcome })
 }
 
 /// Checks that single precision can hold all final triangles.

@@ -10,7 +10,7 @@ use crate::mesh::precision_limit::PrecisionLimit;
 use crate::partition::tree::Cell;
 use crate::plan::budget::BYTES_PER_MERGED_SITE;
 use crate::plan::job_plan::Plan;
-use crate::records::{BorderVertex, SeamTriangle, StepOutput, Store};
+use crate::records::{BorderVertex, SeamTriangle, Store};
 use delaunay::geometry::Site;
 use delaunay::mesh::region::covered;
 use delaunay::triangulation::divide_and_conquer;
@@ -29,7 +29,7 @@ pub fn merge_frontiers(
     store: &Store,
     memory: u64,
     node: NodeIndex,
-) -> crate::Result<StepOutput<Vec<TileIndex>>> {
+) -> crate::Result<Vec<TileIndex>> {
     check_memory(below.iter().map(|&(store, child)| Frontier::count(store, child)).sum::<Result<u64>>()?, memory)?;
     let (union, flows_below) = join(below)?;
     let sites: Vec<Site> = union.iter().map(BorderVertex::plane).collect();
@@ -64,11 +64,11 @@ pub fn merge_frontiers(
         triangles: hull.triangles,
     };
     interrupt::check()?;
-    let records = vec![Seam::new(&seam, flows.trimmed, hull).save(store, node)?, frontier.save(store, node)?];
+    Seam::new(&seam, flows.trimmed, hull).save(store, node)?;
+    frontier.save(store, node)?;
     let above = frontier.tiles();
     let tiles_below = tiles_of(&union, &flows_below.questions);
-    let finished = tiles_below.into_iter().filter(|tile| above.binary_search(tile).is_err());
-    Ok(StepOutput::new(finished.collect(), records))
+    Ok(tiles_below.into_iter().filter(|tile| above.binary_search(tile).is_err()).collect())
 }
 
 /// Joins frontiers into one. Their boundaries, and what they say of ways to the hull, come apart from their sites.

@@ -1,9 +1,8 @@
 //! Collecting points by bucket from many threads: each bucket has a buffer that is written to the point file when it is full.
 
-use crate::partition::point_file::{PointBlock, PointFile, PointFiles, PointRun};
+use crate::partition::point_file::{PointBlock, PointFile, PointRun};
 use points::Point;
 use rayon::prelude::*;
-use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use sys::{Error, Result};
@@ -15,34 +14,6 @@ pub struct Bucket {
     pub blocks: Vec<PointBlock>,
     /// The number of points in them.
     pub points: u64,
-}
-
-impl Bucket {
-    /// Removes the points whose numbers in the job are in one of `orders`, which ascend. Blocks with fewer points are written
-    /// again.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if its blocks cannot be read or written.
-    pub fn remove_records(&mut self, files: &PointFiles, orders: &[Range<u64>]) -> Result<()> {
-        let is_wanted = |point: &Point| {
-            let order = point.order();
-            let after = orders.partition_point(|range| range.start <= order);
-            after == 0 || orders[after - 1].end <= order
-        };
-        let (mut run, mut points) = (PointRun::default(), Vec::new());
-        for block in std::mem::take(&mut self.blocks) {
-            points.clear();
-            files.read(block, &mut points)?;
-            points.retain(is_wanted);
-            match points.len() {
-                0 => {}
-                kept if kept == block.points as usize => self.blocks.push(block),
-                _ => self.blocks.push(files.growing()?.append(&mut run, &points, false)?),
-            }
-        }
-        self.points = self.blocks.iter().map(|block| block.points as u64).sum();
-        Ok(())
-    }
 }
 
 /// Smaller blocks cost more system calls than their memory is worth, and more bytes, because points are packed in groups of 256.
@@ -151,28 +122,4 @@ impl<'a> Buckets<'a> {
 
 fn lock(open: &Mutex<OpenBucket>) -> MutexGuard<'_, OpenBucket> {
     open.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_the_points_of_the_given_records_are_removed() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = PointFile::create(&folder.path().join("points"), 0).unwrap();
-        let buckets = Buckets::new(&file, 1, 0);
-        let points: Vec<Point> = (0..1000).map(|i| Point::new([i as i32, 0], 0, [0; 3], 0, i)).collect();
-        buckets.extend(0, &points).unwrap();
-        let mut bucket = buckets.finish().unwrap().remove(0);
-        let files = PointFiles::open(&[]).unwrap().and(file);
-        bucket.remove_records(&files, &[0..1, 64..64, 100..300, 999..2000]).unwrap();
-        let mut left = Vec::new();
-        bucket.blocks.iter().for_each(|&block| files.read(block, &mut left).unwrap());
-        let orders: Vec<u64> = left.iter().map(Point::order).collect();
-        assert_eq!(orders, (1..100).chain(300..999).collect::<Vec<u64>>());
-        assert_eq!(bucket.points, 798);
-        bucket.remove_records(&files, &[0..500, 500..1000]).unwrap();
-        assert_eq!(bucket, Bucket::default());
-    }
 }

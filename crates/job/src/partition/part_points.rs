@@ -1,5 +1,5 @@
-//! Reading the points of a job of several parts: before a part is done, the inputs that it is the first to need are read whole, and their
-//! points go to the parts that they reach, into a file for each.
+//! Reading the points: before a part is done, the inputs that it is the first to need are read whole, and their points go to the parts that
+//! they reach, into a file for each.
 //!
 //! The part that reads inputs is called their **reader**. Its point files have its number, so every file has one writer.
 
@@ -11,18 +11,20 @@ use crate::partition::breakline_points::add_line_sites;
 use crate::partition::buckets::{Bucket, Buckets};
 use crate::partition::parts::Parts;
 use crate::partition::point_file::{PointBlock, PointFile, PointFiles};
-use crate::partition::read::{JudgedInputs, decode, judge};
+use crate::partition::read::{decode, judge};
 use crate::partition::result::{Partition, PointSummary};
 use crate::partition::tree_builder::TreeBuilder;
 use crate::plan::budget::read_buffer_memory;
+use crate::plan::input_identity::RenamedInputs;
 use crate::plan::job_plan::Plan;
 use crate::plan::text_inputs::{allowed_malformed, stop_at};
 use crate::progress::stage::Stage;
-use crate::records::{RecordRef, StepRecord, Store};
+use crate::records::{StepRecord, Store};
 use points::PointCounts;
 use points::options::OnBadFile;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 use sys::{Error, Result};
 
 /// What a reader found for one part.
@@ -45,6 +47,28 @@ pub struct ReadInputs {
     pub by_part: Vec<PointsForPart>,
     /// The first input that has malformed records, and what it held.
     malformed: Option<(usize, PointCounts)>,
+    /// The inputs, and what they were called when they were read.
+    inputs: Vec<KnownInput>,
+}
+
+/// An input, and what it was called when it was read.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct KnownInput {
+    index: usize,
+    #[serde(with = "sys::path_text")]
+    path: PathBuf,
+}
+
+impl ReadInputs {
+    /// Calls the inputs what they are called in `plan`.
+    pub(crate) fn rename_inputs(&mut self, plan: &Plan) {
+        let pairs = self.inputs.iter().map(|known| (&known.path, &plan.inputs[known.index].source.path));
+        let renamed = RenamedInputs::of_pairs(pairs);
+        for counts in [Some(&mut self.summary.counts), self.malformed.as_mut().map(|(_, counts)| counts)] {
+            let texts = counts.into_iter().flat_map(|counts| counts.examples.iter_mut().chain(&mut counts.notes));
+            texts.for_each(|text| renamed.rename_in(text));
+        }
+    }
 }
 
 /// The blocks that a reader has written, each with the number of its bucket, by part.
@@ -59,7 +83,7 @@ impl ReadBlocks {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn save(&self, store: &Store, reader: PartIndex) -> Result<RecordRef> {
+    pub fn save(&self, store: &Store, reader: PartIndex) -> Result<()> {
         ColumnWriter::default().push(&self.buckets).push(&self.blocks).write(store, StepRecord::Read(reader))
     }
 }
@@ -67,7 +91,7 @@ impl ReadBlocks {
 /// Reads the inputs that `reader` is the first to need, where `malformed` records were found before. With `sync` it waits for the disk.
 ///
 /// # Errors
-/// [`crate::Error::NeedsOnePart`] if a header is wrong or an input is bad and to be left out; [`Error::Input`] if too many records are
+/// [`crate::Error::OtherThanClaimed`] if a header is wrong or an input is bad and to be left out; [`Error::Input`] if too many records are
 /// malformed; [`Error::Io`] if an input cannot be read or a point file cannot be written.
 pub fn read_inputs(
     plan: &Plan,
@@ -86,15 +110,15 @@ pub fn read_inputs(
     let filled = by_input.and_then(|by_input| Ok((by_input, buckets.finish()?)));
     let (by_input, buckets) = filled.map_err(|error| match error {
         // A point lies in a part that the header does not reach.
-        Error::Broken(_) if buckets.has_refused() => crate::Error::NeedsOnePart,
+        Error::Broken(_) if buckets.has_refused() => crate::Error::OtherThanClaimed { is_bad_file: false },
         error => error.into(),
     })?;
     let bad = by_input.0.iter().find(|(_, summary)| summary.counts.malformed > 0);
     let malformed = bad.map(|(input, summary)| (*input, summary.counts.clone()));
-    let JudgedInputs { summary, skipped, .. } = judge(plan, by_input)?;
+    let summary = judge(plan, by_input)?;
     let broken = |bounds| plan.claims.is_some_and(|claims| claims.are_broken_by(bounds, summary.counts.max_rgb));
-    if !skipped.is_empty() || summary.bounds.is_some_and(broken) {
-        return Err(crate::Error::NeedsOnePart);
+    if summary.bounds.is_some_and(broken) {
+        return Err(crate::Error::OtherThanClaimed { is_bad_file: false });
     }
     if sync {
         files.iter().flatten().try_for_each(PointFile::sync)?;
@@ -112,7 +136,9 @@ pub fn read_inputs(
             by_part.push(PointsForPart { part, blocks: blocks.len() as u64, bytes });
         }
     }
-    Ok((ReadInputs { summary, by_part, malformed }, read))
+    let known = |&index: &usize| KnownInput { index, path: plan.inputs[index].source.path.clone() };
+    let inputs = inputs.iter().map(known).collect();
+    Ok((ReadInputs { summary, by_part, malformed, inputs }, read))
 }
 
 /// Makes the reader's point file for `part` if one of its inputs reaches it.
@@ -121,7 +147,7 @@ fn create(parts: &Parts, directory: &JobDirectory, reader: PartIndex, part: Part
         return Ok(None);
     }
     let directory = directory.part(part);
-    create_folder(&directory.points())?;
+    create_folder(directory.points())?;
     PointFile::create(&directory.point_file(reader.0 as u16), reader.0 as u16).map(Some)
 }
 
@@ -183,10 +209,13 @@ impl<'a> PointsOfPart<'a> {
     }
 
     /// Tells whether the files of the part in `directory` hold what was written to them.
-    pub fn are_whole(&self, directory: &JobDirectory) -> bool {
-        let files = directory.point_files().and_then(|files| PointFiles::open(&files));
-        self.blocks.is_empty()
-            || files.is_ok_and(|files| self.blocks.par_iter().all(|(_, block)| files.is_whole(*block)))
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the disk does not tell.
+    pub fn are_whole(&self, directory: &JobDirectory) -> Result<bool> {
+        let files = PointFiles::open(&directory.point_files()?)?;
+        let whole = self.blocks.par_iter().map(|(_, block)| files.is_whole(*block));
+        whole.try_reduce(|| true, |a, b| Ok(a && b))
     }
 
     /// Cuts the part into tiles. `directory` is that of the part.
@@ -199,10 +228,10 @@ impl<'a> PointsOfPart<'a> {
         let own = parts.all().len() as u16;
         let mut found = directory.point_files()?;
         found.retain(|(number, _)| *number != own);
-        create_folder(&directory.points())?;
+        create_folder(directory.points())?;
         let files = PointFiles::open(&found)?.and(PointFile::create(&directory.point_file(own), own)?);
         let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
-        let mut builder = TreeBuilder::repeatable(&files, max_points_per_tile, read_buffer_memory(&plan.options));
+        let mut builder = TreeBuilder::new(&files, max_points_per_tile, read_buffer_memory(&plan.options));
         let read_bytes: u64 = self.blocks.iter().map(|(_, block)| block.bytes()).sum();
         let mut buckets = vec![Bucket::default(); parts.grid.buckets()];
         for (index, block) in self.blocks {
@@ -217,20 +246,19 @@ impl<'a> PointsOfPart<'a> {
             bucket.points += sites.points;
             bucket.blocks.extend(sites.blocks);
         }
-        let mut summary = PointSummary::default();
-        summary.counts.kept = buckets.iter().map(|bucket| bucket.points).sum();
+        let kept: u64 = buckets.iter().map(|bucket| bucket.points).sum();
         builder.grow_root(part, parts.cell(part), &parts.grid, parts.span(part), buckets)?;
         let (tree, blocks) = builder.finish();
         if tree.nodes.len() > PartIndex::STRIDE {
             return Err(Error::Config(format!(
                 "a part of {} points has {} tiles, more than the {} that can be numbered: set a greater [triangulation] \
                  max_points_per_tile",
-                summary.counts.kept,
+                kept,
                 tree.leaves.len(),
                 PartIndex::STRIDE / 2
             )));
         }
         let point_bytes = read_bytes + files.growing()?.bytes();
-        Ok(Partition { tree, blocks, summary, point_bytes, skipped: Vec::new() })
+        Ok(Partition { tree, blocks, kept, point_bytes })
     }
 }

@@ -31,9 +31,8 @@ impl Parts {
         let triangulation = &plan.options.triangulation;
         let grid = Grid::over(plan.extent, wanted_buckets(plan.records, triangulation.max_points_per_tile.0));
         let reach: Vec<GridSpan> = plan.inputs.iter().map(|input| grid.span_of(input.claimed)).collect();
-        let most = if plan.is_one_part() { u64::MAX } else { points_per_part(plan) };
-        let mut cutter =
-            PartCutter { tree: Tree::default(), spans: Vec::new(), sums: expected_points(&grid, &plan.inputs), most };
+        let sums = expected_points(&grid, &plan.inputs);
+        let mut cutter = PartCutter { tree: Tree::default(), spans: Vec::new(), sums, most: plan.points_per_part() };
         cutter.cut(Cell::PLANE, None, grid.span());
         let PartCutter { mut tree, spans, sums, .. } = cutter;
         let expected = spans.iter().map(|&span| sums.points(span)).collect();
@@ -50,12 +49,6 @@ impl Parts {
             new_inputs[first].push(input);
         }
         Parts { grid, tree, spans, part_of, reach, new_inputs, expected }
-    }
-
-    /// Returns the plan of a job that is one part if nothing can be cut: many small inputs may share one area.
-    pub fn cut_or_whole(plan: Plan) -> Plan {
-        let is_cut = !plan.is_one_part() && Parts::of(&plan).all().len() > 1;
-        Plan { claims: plan.claims.filter(|_| is_cut), ..plan }
     }
 
     /// Returns all parts in the order in which they are done.
@@ -109,11 +102,6 @@ impl Parts {
     pub fn new_inputs(&self, part: PartIndex) -> &[usize] {
         &self.new_inputs[part.get()]
     }
-}
-
-/// Returns about how many points a part is to have. Numbers of tiles leave room for a limited number of parts.
-fn points_per_part(plan: &Plan) -> u64 {
-    plan.options.triangulation.max_points_per_part.0.max(plan.records.div_ceil(PartIndex::MOST as u64 / 2))
 }
 
 /// Returns how many points the buckets hold if the points of each input are spread evenly over its box.

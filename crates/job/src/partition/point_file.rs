@@ -1,15 +1,13 @@
-//! Point files: the points between reading and triangulating, packed in blocks that each hold points of one bucket. A job of one part has
-//! one of them. A part of several has one from each reader that finds points for it, so that every file has one writer.
+//! Point files: the points between reading and triangulating, packed in blocks that each hold points of one bucket. A part has one from
+//! each reader that finds points for it, so that every file has one writer.
 //!
-//! A bucket appends its blocks to **runs** of whole pages that it shares with no other. So the points of a tile can be given back to
-//! the disk while others are still needed.
+//! A bucket appends its blocks to **runs** of whole pages, so that the points of a tile lie in few places of the file.
 
 use crate::durable::mapped::{MappedFile, MappedSlice};
 use crate::durable::packing::{pack, unpack};
 use crate::durable::store::PAGE;
 use bytemuck::{Pod, Zeroable};
 use points::Point;
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::ops::Range;
@@ -42,33 +40,6 @@ impl PointBlock {
     pub fn bytes(&self) -> u64 {
         u64::from(self.bytes)
     }
-
-    fn range(&self) -> Range<u64> {
-        self.at..self.at + self.bytes as u64
-    }
-}
-
-/// Returns the pages of `blocks`, which are all those of one or more buckets, by the number of their file, in as few ranges as possible.
-pub fn pages_of(blocks: &[PointBlock]) -> BTreeMap<u16, Vec<Range<u64>>> {
-    let mut files: BTreeMap<u16, Vec<Range<u64>>> = BTreeMap::new();
-    for block in blocks {
-        let pages = block.at / PAGE * PAGE..block.range().end.next_multiple_of(PAGE);
-        files.entry(block.file).or_default().push(pages);
-    }
-    files.into_iter().map(|(file, pages)| (file, joined(pages))).collect()
-}
-
-/// Joins ranges that touch.
-fn joined(mut pages: Vec<Range<u64>>) -> Vec<Range<u64>> {
-    pages.sort_unstable_by_key(|range| range.start);
-    pages.dedup_by(|next, range| {
-        let continues = next.start <= range.end;
-        if continues {
-            range.end = range.end.max(next.end);
-        }
-        continues
-    });
-    pages
 }
 
 /// What a bucket has left of its last run.
@@ -84,7 +55,7 @@ pub struct PointFile {
     map: MappedFile,
     /// Where the next run begins.
     end: AtomicU64,
-    /// The bytes in all blocks that were not freed.
+    /// The bytes in all blocks.
     bytes: AtomicU64,
 }
 
@@ -117,7 +88,7 @@ impl PointFile {
         PointFile { number, path: path.to_path_buf(), file, map, end: AtomicU64::new(0), bytes: AtomicU64::new(0) }
     }
 
-    /// Returns the number of bytes in all blocks that were not freed.
+    /// Returns the number of bytes in all blocks.
     pub fn bytes(&self) -> u64 {
         self.bytes.load(Ordering::Relaxed)
     }
@@ -147,22 +118,15 @@ impl PointFile {
         Ok(PointBlock { at, hash: xxh3_64(&packed), bytes, points: points.len() as u16, file })
     }
 
-    /// Gives the space of `blocks` of this file back to the disk: all those of one or more buckets.
+    /// Tells whether `block` holds what was written to it.
     ///
     /// # Errors
-    /// [`Error::Io`] if that fails.
-    pub fn free(&self, blocks: &[PointBlock]) -> Result<()> {
-        let pages = pages_of(blocks).remove(&self.number).unwrap_or_default();
-        let freed = disk::free(&self.file, &pages).map_err(Error::io("write", &self.path))?;
-        if freed > 0 {
-            self.bytes.fetch_sub(blocks.iter().map(|block| block.bytes as u64).sum(), Ordering::Relaxed);
+    /// [`Error::Io`] if the disk does not tell.
+    pub fn is_whole(&self, block: PointBlock) -> Result<bool> {
+        match self.packed(block) {
+            Err(Error::Io { source, .. }) if source.kind() == ErrorKind::UnexpectedEof => Ok(false),
+            bytes => Ok(xxh3_64(&bytes?) == block.hash),
         }
-        Ok(())
-    }
-
-    /// Tells whether `block` holds what was written to it.
-    pub fn is_whole(&self, block: PointBlock) -> bool {
-        self.packed(block).is_ok_and(|bytes| xxh3_64(&bytes) == block.hash)
     }
 
     /// Appends the points of `block` to `points`.
@@ -218,9 +182,12 @@ impl PointFiles {
         self.0.last().ok_or_else(|| Error::Broken("there is no point file to write to".into()))
     }
 
-    /// Tells whether `block` holds what was written to it.
-    pub fn is_whole(&self, block: PointBlock) -> bool {
-        self.of(block).is_ok_and(|file| file.is_whole(block))
+    /// Tells whether `block` holds what was written to it. If its file is gone, it does not.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the disk does not tell.
+    pub fn is_whole(&self, block: PointBlock) -> Result<bool> {
+        self.of(block).map_or(Ok(false), |file| file.is_whole(block))
     }
 
     /// Appends the points of `block` to `points`.
@@ -266,7 +233,7 @@ mod tests {
         for count in [0, 1, 31, 32, 255, 256, 257, 4096, 5000] {
             let points = points(count, |i| extremes[(i % 4 * i / 3 % 4) as usize]);
             let block = file.append(&mut run, &points, false).unwrap();
-            assert!(file.is_whole(block));
+            assert!(file.is_whole(block).unwrap());
             blocks.push((block, points));
         }
         for (block, expected) in &blocks {
@@ -311,29 +278,6 @@ mod tests {
     }
 
     #[test]
-    fn buckets_share_no_page() {
-        let (_folder, file) = file();
-        let mut runs: Vec<PointRun> = (0..5).map(|_| PointRun::default()).collect();
-        let mut blocks = vec![Vec::new(); 5];
-        for turn in 0..200 {
-            let bucket = turn * 7 % 5;
-            let point = |i: u32| Point::new([i as i32 * 77_777, 5], 9, [i as u16; 3], 1, (i * turn as u32) as u64);
-            let block = file.append(&mut runs[bucket], &points(50 + turn as u32 * 3, point), turn > 180).unwrap();
-            blocks[bucket].push(block);
-        }
-        let mut pages: Vec<Range<u64>> =
-            blocks.iter().flat_map(|blocks| pages_of(blocks).remove(&0).unwrap()).collect();
-        pages.sort_unstable_by_key(|range| range.start);
-        assert!(pages.windows(2).all(|two| two[0].end <= two[1].start), "{pages:?}");
-        file.free(&blocks[2]).unwrap();
-        for (bucket, blocks) in blocks.iter().enumerate() {
-            let is_whole = blocks.iter().all(|&block| file.is_whole(block));
-            assert_eq!(is_whole, bucket != 2 || cfg!(not(target_os = "linux")), "{bucket}");
-        }
-        assert!(file.bytes() < blocks.concat().iter().map(|block| block.bytes as u64).sum());
-    }
-
-    #[test]
     fn blocks_are_found_in_their_files() {
         let folder = tempfile::tempdir().unwrap();
         let path = |number: u16| folder.path().join(number.to_string());
@@ -349,10 +293,8 @@ mod tests {
             files.read(*block, &mut found).unwrap();
             assert_eq!(found, *expected);
         }
-        assert!(!files.is_whole(written[2].0) && files.read(written[2].0, &mut Vec::new()).is_err());
+        assert!(!files.is_whole(written[2].0).unwrap() && files.read(written[2].0, &mut Vec::new()).is_err());
         let files = files.and(PointFile::open(&path(2000), 2000).unwrap());
-        assert!(written.iter().all(|(block, _)| files.is_whole(*block)));
-        let pages = pages_of(&written.iter().map(|(block, _)| *block).collect::<Vec<_>>());
-        assert_eq!(pages.keys().copied().collect::<Vec<_>>(), [3, 7, 2000]);
+        assert!(written.iter().all(|(block, _)| files.is_whole(*block).unwrap()));
     }
 }

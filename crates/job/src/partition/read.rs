@@ -1,20 +1,15 @@
-//! Reading the points: every input is decoded once, and its points go to the buckets of a grid, from which the tree is grown.
+//! Decoding inputs: their points go to the buckets of a grid, from which trees are grown. What they held is judged.
 
-use crate::durable::directory::JobDirectory;
-use crate::index::PartIndex;
-use crate::partition::breakline_points::{BreaklineFilter, add_line_sites};
+use crate::partition::breakline_points::BreaklineFilter;
 use crate::partition::bucket_sorter::BucketSorter;
 use crate::partition::buckets::Buckets;
 use crate::partition::grid::Grid;
-use crate::partition::point_file::{PointFile, PointFiles};
-use crate::partition::result::{Partition, PointSummary};
-use crate::partition::tree::Cell;
-use crate::partition::tree_builder::{TreeBuilder, wanted_buckets};
-use crate::plan::budget::{network_memory, read_buffer_memory};
-use crate::plan::job_plan::{Plan, PlannedInput, SkippedInput};
+use crate::partition::result::PointSummary;
+use crate::plan::budget::network_memory;
+use crate::plan::job_plan::{Plan, PlannedInput};
+use crate::plan::measured_inputs::bad_input;
 use crate::plan::stray_heights::unforeseen_heights;
-use crate::plan::suspect_heights::unannounced_nodata;
-use crate::plan::text_inputs::{allowed_malformed, stop_at, too_many_malformed};
+use crate::plan::text_inputs::{allowed_malformed, stop_at};
 use crate::progress::stage::Stage;
 use breaklines::Breaklines;
 use points::options::OnBadFile;
@@ -22,74 +17,27 @@ use points::surface::SurfaceShares;
 use points::surface_warnings::no_ground;
 use points::{Point, PointCounts, set_network_memory};
 use rayon::prelude::*;
-use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use sys::{Error, Result, interrupt};
 
-/// Reads all inputs of the plan: leaves the points in the job directory and returns what later steps need to know of them.
+/// Sums up the inputs.
 ///
 /// # Errors
-/// [`sys::Error::Input`] if too many records are malformed and bad files must not be left out, [`sys::Error::Io`] if an input cannot be
-/// read or the point file cannot be written.
-pub fn read_points(plan: &Plan, directory: &JobDirectory, stage: &Stage) -> Result<Partition> {
-    let files = PointFiles::open(&[])?.and(PointFile::create(&directory.point_file(0), 0)?);
-    let file = files.growing()?;
-    let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
-    let memory = read_buffer_memory(&plan.options);
-    let grid = Grid::over(plan.extent, wanted_buckets(plan.records, max_points_per_tile));
-    let buckets = Buckets::new(file, grid.buckets(), memory);
-    let by_input = decode(plan, 0..plan.inputs.len(), 0, &grid, &buckets, stage)?;
-    let JudgedInputs { mut summary, skipped, orders } = judge(plan, by_input)?;
-    // Lines alone are no terrain.
-    if let Some(points) = summary.bounds {
-        add_line_sites(plan, summary.counts.max_rgb, &grid, &buckets, |_| true)?;
-        summary.bounds = Some(plan.with_lines(points));
-    }
-    let mut buckets = buckets.finish()?;
-    if !orders.is_empty() {
-        buckets.par_iter_mut().try_for_each(|bucket| bucket.remove_records(&files, &orders))?;
-    }
-    let mut builder = TreeBuilder::new(&files, max_points_per_tile, memory);
-    if summary.counts.kept > 0 {
-        builder.grow_root(PartIndex::FIRST, Cell::PLANE, &grid, grid.span(), buckets)?;
-    }
-    let (tree, blocks) = builder.finish();
-    Ok(Partition { tree, blocks, summary, point_bytes: file.bytes(), skipped })
-}
-
-/// What the inputs held, apart from those that are to be left out.
-pub(crate) struct JudgedInputs {
-    pub(crate) summary: PointSummary,
-    pub(crate) skipped: Vec<SkippedInput>,
-    /// The numbers of the records of those left out.
-    pub(crate) orders: Vec<Range<u64>>,
-}
-
-/// Sums up the inputs. Each is judged by itself, so the others have no say in whether it is left out.
-///
-/// # Errors
-/// [`Error::Input`] if the points of one show that its header hides nodata, and bad files must not be left out.
-pub(crate) fn judge(plan: &Plan, by_input: ByInput) -> Result<JudgedInputs> {
-    let options = &plan.options.input;
-    let mut judged = JudgedInputs { summary: PointSummary::default(), skipped: Vec::new(), orders: Vec::new() };
+/// Where bad files are left out, [`crate::Error::OtherThanClaimed`] if one of them is bad: the job is planned again without it. Otherwise
+/// [`Error::Input`] if the points of one show that its header hides nodata.
+pub(crate) fn judge(plan: &Plan, by_input: ByInput) -> crate::Result<PointSummary> {
+    let mut sum = PointSummary::default();
     for (index, summary) in by_input.0 {
         let input = &plan.inputs[index];
-        let (records, malformed) = (input.source.records, summary.counts.malformed);
-        let is_bad = malformed > allowed_malformed(options.max_malformed_fraction.0, records);
-        let is_skipped = options.on_bad_file == OnBadFile::Skip;
-        let why = unannounced_nodata(&input.source, summary.bounds, &plan.lattice, &plan.options);
-        if let Some(why) = why.as_ref().filter(|_| !is_skipped) {
-            return Err(Error::input(&input.source.path, why));
+        if let Some(why) = bad_input(&input.source, &summary.counts, summary.bounds, &plan.lattice, &plan.options) {
+            return Err(match plan.options.input.on_bad_file {
+                OnBadFile::Skip => crate::Error::OtherThanClaimed { is_bad_file: true },
+                OnBadFile::Stop => Error::input(&input.source.path, why).into(),
+            });
         }
-        let too_many = || is_bad.then(|| too_many_malformed(&summary.counts, malformed, records));
-        if let Some(why) = why.or_else(too_many).filter(|_| is_skipped) {
-            judged.skipped.push(SkippedInput { file: input.source.path.clone(), why });
-            judged.orders.push(input.rules.first_order..input.rules.first_order + records);
-        } else {
-            judged.summary += with_notes(input, plan, summary);
-        }
+        sum += with_notes(input, plan, summary);
     }
-    Ok(judged)
+    Ok(sum)
 }
 
 /// Adds what the user should know about an input that only reading it shows.

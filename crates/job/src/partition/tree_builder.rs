@@ -31,27 +31,13 @@ pub(crate) struct TreeBuilder<'a> {
     max_points_per_tile: u64,
     /// Bytes for buffers.
     memory: u64,
-    /// Whether the points of a bucket stay once they are in smaller ones.
-    keeps_crowded: bool,
     tree: Tree,
     blocks: Vec<Vec<PointBlock>>,
 }
 
 impl<'a> TreeBuilder<'a> {
     pub(crate) fn new(files: &'a PointFiles, max_points_per_tile: u64, memory: u64) -> TreeBuilder<'a> {
-        TreeBuilder {
-            files,
-            max_points_per_tile,
-            memory,
-            keeps_crowded: false,
-            tree: Tree::default(),
-            blocks: Vec::new(),
-        }
-    }
-
-    /// As [`TreeBuilder::new`], but the points of crowded buckets stay, so that the tree can be grown again after an interruption.
-    pub(crate) fn repeatable(files: &'a PointFiles, max_points_per_tile: u64, memory: u64) -> TreeBuilder<'a> {
-        TreeBuilder { keeps_crowded: true, ..TreeBuilder::new(files, max_points_per_tile, memory) }
+        TreeBuilder { files, max_points_per_tile, memory, tree: Tree::default(), blocks: Vec::new() }
     }
 
     /// Grows the tree of `part`, which decides `cell`, over the buckets in `span` of `grid`.
@@ -115,20 +101,16 @@ impl<'a> TreeBuilder<'a> {
         let Some(bounds) = bounds.filter(|bounds| bounds.min != bounds.max) else {
             return Ok(self.add_leaf(cell, parent, bucket));
         };
-        let file = self.files.growing()?;
         let grid = Grid::over(bounds, wanted_buckets(bucket.points, self.max_points_per_tile));
-        let finer = Buckets::new(file, grid.buckets(), self.memory);
+        let finer = Buckets::new(self.files.growing()?, grid.buckets(), self.memory);
         bucket.blocks.par_iter().try_for_each(|&block| {
             interrupt::check()?;
             let mut points = Vec::new();
             self.files.read(block, &mut points)?;
             BucketSorter::new(&grid, &finer).add(&points)
         })?;
-        let finer = finer.finish()?;
-        if !self.keeps_crowded {
-            file.free(&bucket.blocks)?;
-        }
-        self.grow(cell, parent, &grid, finer)
+        // The points of the bucket stay, so that the tree can be grown again after an interruption.
+        self.grow(cell, parent, &grid, finer.finish()?)
     }
 
     /// Returns the box of the points in `blocks`.

@@ -26,13 +26,13 @@ pub struct JobHeader {
     pub fingerprint: Fingerprint,
     /// How much coarser than the inputs ask for the lattice is.
     pub coarsening: LatticeCoarsening,
-    /// Tells the folders of this job's parts from those of others; 0 for a job of one part.
+    /// Tells the folders of this job's parts from those of others.
     #[serde(default)]
     pub id: u64,
     /// The submission that started it over; 0 if none did.
     #[serde(default)]
     pub submission: u64,
-    /// When a job of several parts was begun: before tasks looked at its inputs.
+    /// When the job was begun: before tasks looked at its inputs.
     #[serde(default)]
     pub begun: Option<SystemTime>,
 }
@@ -62,7 +62,7 @@ pub struct JobIdentity {
 
 /// Version of the records in the store, of the plan, of the names and bytes of results, and of which nodes merge. It changes with every
 /// change of these, so that no run misreads what another version left, or mixes its results with them.
-pub(crate) const LAYOUT: u32 = 26;
+pub(crate) const LAYOUT: u32 = 27;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]

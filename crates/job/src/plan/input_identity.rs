@@ -106,9 +106,8 @@ impl InputIdentities {
 
     /// Returns what the inputs are called by now, if those at `paths` are as many, in the same order.
     pub(crate) fn present_names(&self, paths: &[PathBuf]) -> Option<RenamedInputs> {
-        let pairs = self.0.iter().map(|file| file.path.clone()).zip(paths.iter().cloned());
-        let is_same = self.0.len() == paths.len();
-        is_same.then(|| RenamedInputs(pairs.filter(|(old, new)| old != new).collect()))
+        let pairs = self.0.iter().map(|file| &file.path).zip(paths);
+        (self.0.len() == paths.len()).then(|| RenamedInputs::of_pairs(pairs))
     }
 
     /// Returns how the input that had the path `known` when the job was `begun` differs from what it was. It is at `path` now.
@@ -142,8 +141,7 @@ impl InputIdentities {
 
     /// Returns what the inputs are called by now. They must have the same contents in the same order as `earlier`.
     pub(crate) fn renamed_since(&self, earlier: &InputIdentities) -> RenamedInputs {
-        let pairs = earlier.0.iter().zip(&self.0).map(|(old, new)| (old.path.clone(), new.path.clone()));
-        RenamedInputs(pairs.filter(|(old, new)| old != new).collect())
+        RenamedInputs::of_pairs(earlier.0.iter().zip(&self.0).map(|(old, new)| (&old.path, &new.path)))
     }
 }
 
@@ -162,6 +160,12 @@ impl InputIdentity {
 pub struct RenamedInputs(BTreeMap<PathBuf, PathBuf>);
 
 impl RenamedInputs {
+    /// Returns the inputs that have another path now, of pairs of an old one and the present one.
+    pub(crate) fn of_pairs<'a>(pairs: impl Iterator<Item = (&'a PathBuf, &'a PathBuf)>) -> RenamedInputs {
+        let changed = pairs.filter(|(old, new)| old != new);
+        RenamedInputs(changed.map(|(old, new)| (old.clone(), new.clone())).collect())
+    }
+
     /// Returns these and the others.
     pub(crate) fn and(mut self, others: RenamedInputs) -> RenamedInputs {
         self.0.extend(others.0);

@@ -1,7 +1,8 @@
 //! The plan of a job.
 
 use crate::durable::atomic_file::{PendingFile, write_pending};
-use crate::options::{JobOptions, KeepSteps};
+use crate::index::PartIndex;
+use crate::options::JobOptions;
 use crate::plan::breaklines::PlannedBreaklines;
 use crate::plan::input_identity::RenamedInputs;
 use crate::plan::lattice_choice::LatticeCoarsening;
@@ -9,7 +10,6 @@ use crate::plan::missing_attributes::missing_attributes;
 use breaklines::Breaklines;
 use crs::Crs;
 use delaunay::geometry::Bounds;
-use delaunay_gpu::triangulation_options::MaxPointsPerPart;
 use lattice::Lattice;
 use points::{PointCounts, PointRules, Source};
 use serde::{Deserialize, Serialize};
@@ -39,8 +39,9 @@ pub struct Plan {
     pub lattice: Lattice,
     /// The box of the inputs on the lattice as their headers claim it, within `[input] bounds`.
     pub extent: Bounds<2>,
-    /// What a job of several parts must know before all points are read; `None` for a job of one part.
-    pub claims: Option<HeaderClaims>,
+    /// What is known of all points before the first is triangulated: what headers claim, or what was read where one part has read all. `None`
+    /// before that.
+    pub claims: Option<Claims>,
     /// The heights that a ramp of colours spans, by a sample of the points. `None` if they are too few to tell: then the box of the points,
     /// or what is claimed of it, decides.
     pub heights: Option<HeightRange>,
@@ -54,8 +55,8 @@ pub struct Plan {
     pub claimed_area: u64,
     /// The way from the lattice to glTF, of a scene that is not bent.
     pub frame: Frame,
-    /// How the scene follows the curve of the earth. It is found once and kept, because not all projections have the same bits on every
-    /// machine: in a job of several parts before the plan is written down, in others once the points are read.
+    /// How the scene follows the curve of the earth. It is found once, by the claims, and kept, because not all projections have the same bits
+    /// on every machine.
     #[serde(default)]
     pub curvature: Option<Curvature>,
     /// The breaklines; `None` without any.
@@ -91,20 +92,20 @@ pub(crate) fn decoded_records(source: &Source, rules: &PointRules) -> u64 {
     source.decoded_chunks(rules.bounds.as_ref()).records
 }
 
-/// What headers and the first chunks of the inputs say of all points. All tiles have one style, so it cannot wait for the last point. If
-/// a point shows that a claim is wrong, the job starts again as one part.
+/// What is known of all points before the first is triangulated. All tiles have one style, so in a job of several parts it cannot wait for
+/// the last point: headers and first chunks tell. If a point shows that one is wrong, all inputs are measured, and the job starts again.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct HeaderClaims {
+pub struct Claims {
     /// The lattice box of the points.
     pub bounds: Bounds<3>,
     /// The greatest red, green or blue. Only whether it exceeds 0, and 255, counts.
     pub max_rgb: u16,
 }
 
-impl HeaderClaims {
+impl Claims {
     /// Returns the claims with the sites of lines within `bounds`.
-    pub(crate) fn with_lines(self, bounds: Option<Bounds<3>>) -> HeaderClaims {
-        HeaderClaims { bounds: bounds.map_or(self.bounds, |bounds| bounds.union(self.bounds)), ..self }
+    pub(crate) fn with_lines(self, bounds: Option<Bounds<3>>) -> Claims {
+        Claims { bounds: bounds.map_or(self.bounds, |bounds| bounds.union(self.bounds)), ..self }
     }
 
     /// Tells whether points within `bounds`, of which `max_rgb` is the greatest colour, contradict the claims.
@@ -141,9 +142,24 @@ impl SkippedInput {
 }
 
 impl Plan {
-    /// Tells whether the job is one part.
-    pub fn is_one_part(&self) -> bool {
-        self.claims.is_none()
+    /// Returns about how many points a part is to have: all, if they are not many more. Numbers of tiles leave room for a limited number of
+    /// parts.
+    pub(crate) fn points_per_part(&self) -> u64 {
+        let wanted = self.options.triangulation.max_points_per_part;
+        match self.decoded_records() <= wanted.most_in_one_part() {
+            true => u64::MAX,
+            false => wanted.0.max(self.records.div_ceil(PartIndex::MOST as u64 / 2)),
+        }
+    }
+
+    /// Returns the number of records that are decoded.
+    pub(crate) fn decoded_records(&self) -> u64 {
+        self.inputs.iter().map(PlannedInput::decoded_records).sum()
+    }
+
+    /// Tells whether the mesh stays on the disk until the job is done, so that it can go on with another style.
+    pub(crate) fn keeps_mesh(&self) -> bool {
+        self.options.limits.keep_steps.keeps(self.decoded_records())
     }
 
     /// Returns the breaklines; `None` without any.
@@ -152,12 +168,6 @@ impl Plan {
     /// Those of [`PlannedBreaklines::built`].
     pub fn built_breaklines(&self) -> Result<Option<Arc<Breaklines>>> {
         self.breaklines.as_ref().map(PlannedBreaklines::built).transpose()
-    }
-
-    /// Tells whether a point that both plans read comes to the same place, or is dropped, in both.
-    pub(crate) fn reads_like(&self, other: &Plan) -> bool {
-        let [own, others] = [self, other].map(|plan| plan.breaklines.as_ref().map(PlannedBreaklines::cut_from));
-        self.lattice == other.lattice && own == others
     }
 
     /// Returns the box of all that the mesh has, of which the kept points have `points`.
@@ -172,22 +182,7 @@ impl Plan {
         warnings.extend(self.warnings.clone());
         let sources = self.inputs.iter().map(|input| &input.source);
         warnings.extend(missing_attributes(sources, self.options.output.attributes));
-        warnings.extend(self.freed_steps());
         warnings
-    }
-
-    /// Says that a job of several parts does not keep its steps, if the user wants it to.
-    pub(crate) fn freed_steps(&self) -> Option<String> {
-        let is_wanted = self.options.limits.keep_steps == KeepSteps::Always;
-        (is_wanted && !self.is_one_part()).then(|| {
-            let points = self.inputs.iter().map(PlannedInput::decoded_records).sum();
-            format!(
-                "[limits] keep_steps = true has no effect in a job of several parts: they free their steps, and with another style the \
-                 job starts over; with [triangulation] max_points_per_part = {} or more the job is one part and keeps them, but it takes \
-                 more disk (gdt-batch check says how much)",
-                MaxPointsPerPart::for_one_part(points).0
-            )
-        })
     }
 
     /// Calls the inputs what they are called by now.

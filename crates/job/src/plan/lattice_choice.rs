@@ -17,9 +17,10 @@ pub struct LatticeCoarsening {
     pub horizontal: u32,
     /// In z.
     pub vertical: u32,
-    /// Whether the job is one part whatever its size, because a header proved wrong.
+    /// Whether every point is looked at before the plane is cut into parts, because a header proved wrong, or a file that is to be left out
+    /// bad.
     #[serde(default)]
-    pub one_part: bool,
+    pub measured: bool,
     /// Whether every point is looked at before the lattice is chosen, because some lie far outside what headers claim.
     #[serde(default)]
     pub far_points: bool,

@@ -13,8 +13,9 @@ use crate::plan::flat_points::flat_points;
 use crate::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of_geocentric};
 use crate::plan::height_range::HeightSample;
 use crate::plan::inputs::{check_missing_records, open_all};
-use crate::plan::job_plan::{HeaderClaims, Plan, PlannedInput, SkippedInput, decoded_records};
+use crate::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::plan::lattice_choice::{LatticeCoarsening, LatticeRequest, choose_lattice, fineness};
+use crate::plan::measured_inputs::measured_claims;
 use crate::plan::other_unit::{refuse_other_unit, warn_of_dropped_units};
 use crate::plan::stray_heights::JobHeights;
 use crate::plan::suspect_heights::check_suspect_heights;
@@ -43,7 +44,7 @@ const MAX_RECORDS: u64 = 1 << 40;
 /// More warnings than this, one for each of thousands of files, would hide the others.
 const MAX_WARNINGS: usize = 50;
 
-/// Makes the plan of the job with these `options`. `coarsening` is zero unless an earlier attempt failed with [`crate::Error::TooFine`].
+/// Makes the plan of the job with these `options`. `coarsening` tells what earlier attempts have shown.
 ///
 /// # Errors
 /// [`Error::Config`] if there are no inputs or they do not fit together; [`Error::Input`] if one is bad and must not be left
@@ -52,22 +53,6 @@ pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> crate::
     set_network_memory(network_memory(options));
     let (sources, skipped) = open_all(&options.input, &row_choice(options))?;
     plan_sources(sources, skipped, options, coarsening)
-}
-
-/// Makes the plan again without the inputs that proved bad when their points were read: the plan that [`make_plan`] makes if
-/// they are not there.
-///
-/// # Errors
-/// As [`make_plan`].
-pub fn replan_without(plan: Plan, bad: &[SkippedInput]) -> crate::Result<Plan> {
-    let is_bad = |source: &Source| bad.iter().any(|bad| bad.file == source.path);
-    let sources = plan.inputs.into_iter().map(|input| input.source).filter(|source| !is_bad(source));
-    let is_new = |bad: &&SkippedInput| !plan.skipped.contains(bad);
-    let skipped = plan.skipped.iter().chain(bad.iter().filter(is_new)).cloned();
-    let is_whole = plan.claims.is_none();
-    let again = plan_sources(sources.collect(), skipped.collect(), &plan.options, plan.coarsening)?;
-    // What was not cut into parts is not cut now.
-    Ok(Plan { claims: again.claims.filter(|_| !is_whole), ..again })
 }
 
 /// Tells whether points lie so far from all others that they are mistakes, though no header claims them: whether a plan that looks at all
@@ -112,6 +97,10 @@ fn plan_sources(
             {
                 sources.retain(|source| source.path != path);
                 skipped.push(SkippedInput { file: path, why: what });
+            }
+            Err(crate::Error::BadInputs(bad)) => {
+                sources.retain(|source| bad.iter().all(|(file, _)| *file != source.path));
+                skipped.extend(bad.into_iter().map(|(file, why)| SkippedInput { file, why }));
             }
             planned => {
                 let (plan, rules) = planned?;
@@ -215,10 +204,15 @@ fn try_plan(
         metres: wish.metres,
     };
     let breaklines = PlannedBreaklines::of(&lines, options, &cloud, &mut warnings)?;
-    let claimed = extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>();
     let decoded: u64 = sources.iter().zip(&rules).map(|(source, rules)| decoded_records(source, rules)).sum();
-    let has_parts = !coarsening.one_part && decoded > options.triangulation.max_points_per_part.most_in_one_part();
-    let claims = has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?;
+    let has_parts = decoded > options.triangulation.max_points_per_part.most_in_one_part();
+    let (claimed, claims) = match coarsening.measured {
+        true => measured_claims(sources, &rules, &lattice, options, clipped)?,
+        false => (
+            extent.boxes.iter().map(|claim| claimed_box(&lattice, claim, clipped)).collect::<Vec<_>>(),
+            has_parts.then(|| claims(sources, &rules, &lattice, &extent, clipped)).transpose()?,
+        ),
+    };
     let lines_at = breaklines.as_ref().and_then(|lines| lines.bounds);
     let claims = claims.map(|claims| claims.with_lines(lines_at));
     let [low, high] = claimed_heights(&lattice, &extent).map(|z| z.round() as i32);
@@ -277,7 +271,7 @@ fn claims(
     lattice: &Lattice,
     extent: &Extent,
     clipped: Bounds<2>,
-) -> Result<HeaderClaims> {
+) -> Result<Claims> {
     let [low, high] = claimed_heights(lattice, extent);
     let [low, high] = [low.floor() - 1.0, high.ceil() + 1.0].map(|z| z as i32);
     let bounds = Bounds {
@@ -292,7 +286,7 @@ fn claims(
         source.decode(chunks.chunk(0), rules, &mut |_| Ok(())).map(|counts| counts.max_rgb)
     };
     let max_rgb = sources.par_iter().zip(rules).map(first_colors).try_reduce(|| 0, |a, b| Ok(a.max(b)))?;
-    Ok(HeaderClaims { bounds, max_rgb })
+    Ok(Claims { bounds, max_rgb })
 }
 
 /// Returns a sentence about the files whose sample has no ground, if the job wants only that, and others have some.

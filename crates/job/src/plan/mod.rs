@@ -21,6 +21,7 @@ pub mod inputs;
 pub mod job_plan;
 pub mod lattice_choice;
 pub mod make_plan;
+pub(crate) mod measured_inputs;
 mod missing_attributes;
 pub mod named_files;
 pub mod no_points;

@@ -4,7 +4,6 @@ use crate::durable::directory::JobDirectory;
 use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::machine;
 use crate::options::JobOptions;
-use crate::partition::parts::Parts;
 use crate::plan::budget::workers;
 use crate::plan::job_plan::{Plan, SkippedInput};
 use crate::plan::lattice_choice::LatticeCoarsening;
@@ -68,8 +67,7 @@ pub struct Preflight {
     pub temporary: u64,
     /// About how many bytes the results take.
     pub results: u64,
-    /// The least number of bytes that the disk must have. With room for all files, results are written while all temporary files
-    /// still exist, unless the job frees them as it goes; with less, some of these are removed before.
+    /// The least number of bytes that the disk must have.
     pub disk: u64,
     /// Bytes free on the disk of the output directory, including what an interrupted run takes there; `None` if the system does not
     /// tell.
@@ -116,7 +114,7 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     let directory = JobDirectory::new(&options.output.directory);
     check_nothing_in_the_way(&directory)?;
     check_results_are_ours(&directory, options.output.page)?;
-    let plan = Parts::cut_or_whole(make_plan(options, LatticeCoarsening::default())?);
+    let plan = make_plan(options, LatticeCoarsening::default())?;
     check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
     check_raster(&plan)?;

@@ -12,7 +12,7 @@ use crate::publish::raster::check::planned_raster;
 use crate::publish::raster::write_raster::raster_memory;
 use delaunay::geometry::Bounds;
 use points::is_url;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tiles::Compression;
 use tiles::attributes::AttributeChoice;
 use tiles::color::HeightRange;
@@ -22,8 +22,8 @@ use tiles::raster::options::RasterCompression;
 
 /// Bytes that the packed point file takes for a point; 9 to 10 where points are dense.
 const BYTES_PER_POINT: u64 = 12;
-/// Bytes that the store takes for a site: its packed position, colour and class, and two triangles.
-const STORE_PER_SITE: u64 = 9 + 2 * 6;
+/// Bytes that the store takes for a site: its packed position, colour and class, and two packed triangles.
+const STORE_PER_SITE: u64 = 9 + 2 * 4;
 /// Bytes that the store takes for a site on a tile's frontier, in all records that it is in.
 const STORE_PER_BORDER_SITE: u64 = 500;
 /// Bytes of the journal and the plan of a small job, and of what the files of the store take to whole blocks of the disk.
@@ -58,8 +58,6 @@ fn result_per_site(compression: Compression, attributes: AttributeChoice) -> u64
 pub(crate) struct DiskEstimate {
     /// The point file and the store, as much of them as there is at one time.
     pub(crate) temporary: u64,
-    /// The store, if nothing of it is freed.
-    store: u64,
     /// The results.
     pub(crate) results: u64,
     /// The least that the disk must have for all together.
@@ -82,38 +80,25 @@ impl DiskEstimate {
         let in_tiles = tile_bytes(points, tiles, &options.output, max_one_file, points > per_tile);
         let page = if options.output.page { PAGE } else { 0 };
         let results = in_tiles + pixels * PREVIEW_PER_PIXEL + page + raster;
-        if plan.is_one_part() && options.limits.keep_steps.keeps(points) {
-            // The points may go before the results come.
-            return DiskEstimate {
-                temporary: point_file.max(raster) + store,
-                store,
-                results,
-                least: store + point_file.max(results + raster),
-            };
-        }
-        // Points go while the store grows, and leaves while the results grow.
-        let most =
-            if options.output.max_edge == MaxEdge::Auto { store } else { border + waiting_leaves(plan, leaves, tiles) };
-        let temporary = point_file.max(most + raster);
-        DiskEstimate { temporary, store, results, least: point_file.max(most + results + raster) }
+        // Leaves go while the results grow, unless all stay.
+        let keeps_leaves = options.output.max_edge == MaxEdge::Auto || plan.keeps_mesh();
+        let most = if keeps_leaves { store } else { border + waiting_leaves(plan, points, leaves, tiles) };
+        // The points of a part stay until it is meshed; those of all others are gone by the last.
+        let of_last = point_file / points.max(1) * points.min(plan.points_per_part());
+        let temporary = point_file.max(most + of_last.max(raster));
+        DiskEstimate { temporary, results, least: point_file.max(most + results + of_last.max(raster)) }
     }
 }
 
 /// Returns the bytes of leaves whose tiles are not written yet, at most at one time. Tiles along the borders of large parts of the
 /// tree wait until these parts are joined.
-fn waiting_leaves(plan: &Plan, leaves: u64, tiles: u64) -> u64 {
-    if !plan.is_one_part() {
+fn waiting_leaves(plan: &Plan, points: u64, leaves: u64, tiles: u64) -> u64 {
+    if points > plan.points_per_part() {
         // All tiles along the border of a part wait, a fifth of some hundred.
         return leaves / 4;
     }
     const SHARE: u64 = 20;
     leaves / tiles.isqrt().max(SHARE) * SHARE
-}
-
-/// Tells whether the disk has ample room for all other files besides the points, which are there already.
-pub(crate) fn has_room_besides_points(plan: &Plan, kept: KeptPoints, max_one_file: u64) -> bool {
-    let DiskEstimate { store, results, .. } = DiskEstimate::of(plan, kept, max_one_file);
-    machine::free_disk(&plan.options.output.directory).is_some_and(|free| (store + results) / 4 * 5 <= free)
 }
 
 /// Returns about how many tiles there will be: tiles come out between half full and full.
@@ -123,9 +108,7 @@ pub(crate) fn tiles(plan: &Plan, kept: KeptPoints) -> u64 {
 
 /// Returns the most points that a tile may have.
 fn most_per_tile(plan: &Plan) -> u64 {
-    let triangulation = &plan.options.triangulation;
-    let most = triangulation.max_points_per_tile.0;
-    if plan.is_one_part() { most } else { most.min(triangulation.max_points_per_part.0) }
+    plan.options.triangulation.max_points_per_tile.0.min(plan.points_per_part())
 }
 
 /// Returns the bytes of the records that stay until the job is done.
@@ -193,8 +176,14 @@ fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {
 /// Returns the bytes of the files that an interrupted run left and that this one takes over or replaces.
 pub(crate) fn own_bytes(plan: &Plan) -> u64 {
     let directory = JobDirectory::new(&plan.options.output.directory);
-    let entries = std::fs::read_dir(directory.job()).into_iter().flatten().flatten();
-    bytes_of(entries.map(|entry| entry.path())) + bytes_of(directory.waiting_results())
+    let entries = |folder: &Path| {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.map(|entry| entry.path()).collect::<Vec<_>>()
+    };
+    let parts = [entries(&directory.parts()), entries(&directory.points_by_part())].concat();
+    let files =
+        parts.iter().map(|part| entries(part)).chain([entries(directory.job()), entries(directory.join().job())]);
+    bytes_of(files.flatten()) + bytes_of(directory.waiting_results())
 }
 
 /// Returns the bytes of the results of an earlier job, which stay until those of this one are whole.

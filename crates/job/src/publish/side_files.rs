@@ -8,7 +8,7 @@ use crate::durable::directory::JobDirectory;
 use crate::index::TileIndex;
 use crate::partition::tree::Tree;
 use crate::publish::flat_tile::FlatScene;
-use crate::records::{StepOutput, StepRecord, Store};
+use crate::records::{StepRecord, Store};
 use breaklines::Breaklines;
 use lattice::Lattice;
 use std::path::PathBuf;
@@ -53,7 +53,7 @@ pub(crate) fn write_side_files(
     content: &SideFiles,
     canvas: &Canvas,
     tiles: &dyn EachTile,
-) -> Result<StepOutput<u64>> {
+) -> Result<(u64, Vec<PendingFile>)> {
     let output = directory.output();
     let mut files = vec![
         write_pending(&output.georeference(), content.georeference.as_bytes())?,
@@ -86,8 +86,7 @@ pub(crate) fn write_side_files(
         }
         files.push(find_pending(&output.terrain())?);
     }
-    let bytes = files.iter().map(|file| file.bytes).sum();
-    Ok(StepOutput { files, ..StepOutput::new(bytes, Vec::new()) })
+    Ok((files.iter().map(|file| file.bytes).sum(), files))
 }
 
 /// Writes `tileset.json` and the external tilesets.

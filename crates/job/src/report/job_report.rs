@@ -107,7 +107,7 @@ pub struct Report {
     pub memory_limit: u64,
     /// Worker threads.
     pub threads: usize,
-    /// The number of steps that an interrupted run had finished. The stages include their times only in a job of several parts.
+    /// The number of phases that an interrupted run had completed. The stages include their times.
     pub resumed: u64,
     /// Seconds from start to end, of the process that wrote the report. If tasks did the job, from the end of their plan.
     pub wall_s: f64,

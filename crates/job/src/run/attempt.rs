@@ -6,31 +6,25 @@ use crate::durable::directory::JobDirectory;
 use crate::durable::lock::Lock;
 use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::options::{JobOptions, RunOptions};
-use crate::partition::parts::Parts;
-use crate::partition::result::Partition;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
-use crate::plan::job_plan::Plan;
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::plan::make_plan::{are_there_far_points, make_plan};
 use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::progress::clock::JobClock;
-use crate::progress::stage::{JobProgress, ProgressOutput};
+use crate::progress::stage::JobProgress;
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::raster::check::check_raster;
 use crate::report::job_report::Report;
-use crate::run::damage::damaged_by_tasks;
+use crate::run::damage::{damaged_by_tasks, is_damage};
+use crate::run::earlier_run::{EarlierRun, RunStart, place_results_of_finished_job, start};
 use crate::run::finished::{InPlace, known_submission, results_in_place};
-use crate::run::part_entries::StepsOfParts;
-use crate::run::read_step::note_skipped;
-use crate::run::resume;
-use crate::run::resume::{EarlierRun, RunStart, place_results_of_finished_job};
-use crate::run::resume_parts::start_parts;
-use crate::run::run_context::RunContext;
-use crate::run::single_process::SingleProcess;
-use crate::run::stage_costs::stage_costs;
-use crate::run::temporary_bytes::TemporaryBytes;
+use crate::run::part_entries::PartJournals;
+use crate::run::phases::do_phases;
+use crate::run::phases::plan_phase::note_skipped;
+use crate::run::phases::stage_costs::stage_costs;
+use crate::run::whole_run::WholeRun;
 use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
 use std::sync::Mutex;
@@ -44,18 +38,6 @@ pub(crate) const NO_LOCKS: &str =
 /// Give up after this many tenfold coarsenings: what is left is no terrain.
 const MAX_COARSENINGS: u32 = 6;
 
-/// The walk of a job through the steps after the plan. The partition is that of an earlier run, if one read the points.
-pub(crate) type Walk = fn(&RunContext, Plan, Option<Partition>) -> Result<Report>;
-
-/// Who has done what is there of a job.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum EarlierWork {
-    /// A run that was interrupted, so what it left may be damaged.
-    Interrupted,
-    /// Tasks, and all phases by part are complete: what is there is on the disk.
-    ByTasks,
-}
-
 /// What all attempts at a job have in common.
 struct JobRequest<'a> {
     options: &'a JobOptions,
@@ -66,8 +48,9 @@ struct JobRequest<'a> {
     /// Says which inputs seem to have changed since tasks planned the job.
     modified: Option<String>,
     clock: JobClock,
-    walk: Walk,
-    work: EarlierWork,
+    /// Whether tasks have completed all phases by part: what is there is on the disk. Otherwise an interrupted run may have left something
+    /// damaged.
+    is_by_tasks: bool,
     /// The submission that started the job over; 0 if none did.
     submission: u64,
 }
@@ -76,12 +59,7 @@ struct JobRequest<'a> {
 ///
 /// # Errors
 /// See [`crate::run`].
-pub(crate) fn run_until_it_fits(
-    options: &JobOptions,
-    run: RunOptions,
-    walk: Walk,
-    work: EarlierWork,
-) -> Result<Report> {
+pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tasks: bool) -> Result<Report> {
     let clock = JobClock::start();
     let directory = JobDirectory::new(&options.output.directory);
     check_nothing_in_the_way(&directory)?;
@@ -102,27 +80,27 @@ pub(crate) fn run_until_it_fits(
     let submission = known.max(run.submission).max(known_submission(&directory)?);
     // Before the inputs, so that a job that must have a GPU fails at once if there is none.
     let memory = options.limits.memory.0;
-    let triangulator = match work {
-        EarlierWork::Interrupted => Triangulator::new(&options.triangulation, &options.gpu, memory)?,
+    let triangulator = match is_by_tasks {
         // All is triangulated, and this machine may have no GPU.
-        EarlierWork::ByTasks => Triangulator::without_gpu(&options.triangulation),
+        true => Triangulator::without_gpu(&options.triangulation),
+        false => Triangulator::new(&options.triangulation, &options.gpu, memory)?,
     };
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    let (fingerprint, modified) = match (work, &earlier) {
-        (EarlierWork::ByTasks, Some(earlier)) => earlier.as_planned(fingerprint)?,
-        (EarlierWork::ByTasks, None) => {
-            return Err(Error::TooEarly("the plan of the job is gone: submit the job again".into()));
-        }
-        (EarlierWork::Interrupted, _) => (fingerprint, None),
+    let (fingerprint, modified) = match (is_by_tasks, &earlier) {
+        (true, Some(earlier)) => earlier.as_planned(fingerprint)?,
+        (true, None) => return Err(Error::TooEarly("the plan of the job is gone: submit the job again".into())),
+        (false, _) => (fingerprint, None),
     };
     let job =
-        JobRequest { options, run, triangulator, directory, fingerprint, modified, clock, walk, work, submission };
-    let mut coarsening = coarsening_of(&job.directory, earlier.as_ref(), &job.fingerprint)?;
+        JobRequest { options, run, triangulator, directory, fingerprint, modified, clock, is_by_tasks, submission };
+    let known = earlier.as_ref().and_then(|earlier| earlier.coarsening(&job.fingerprint));
+    let mut coarsening = known.unwrap_or_default();
     let mut has_looked = coarsening.far_points;
     loop {
         let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
         // A few points that are mistakes must not cost all others their precision.
-        if matches!(outcome, Err(Error::NeedsOnePart | Error::TooFine { .. })) && !has_looked {
+        if matches!(outcome, Err(Error::OtherThanClaimed { is_bad_file: false } | Error::TooFine { .. })) && !has_looked
+        {
             has_looked = true;
             coarsening.far_points = on_threads(workers(options, 0)?, || are_there_far_points(options, coarsening))?;
             if coarsening.far_points {
@@ -130,20 +108,23 @@ pub(crate) fn run_until_it_fits(
                 continue;
             }
         }
-        // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
-        if let (Err(Error::NeedsOnePart), false) = (&outcome, coarsening.one_part) {
-            run.progress.note("what was read contradicts the header of a file; starting again without parts");
-            coarsening.one_part = true;
+        if let (Err(Error::OtherThanClaimed { is_bad_file }), false) = (&outcome, coarsening.measured) {
+            run.progress.note(match is_bad_file {
+                true => "a file is bad and will be left out; measuring all files and starting again",
+                false => "what was read contradicts the header of a file; measuring all files and starting again",
+            });
+            coarsening.measured = true;
             continue;
         }
         if let Err(Error::DamagedSteps) = outcome {
-            if work == EarlierWork::ByTasks {
+            if is_by_tasks {
                 // The work of many machines is not done again by one.
                 return Err(damaged_by_tasks(&job.directory));
             }
             run.progress.note("what the interrupted run left is damaged; starting over");
             continue;
         }
+        // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
         let Err(Error::TooFine { vertical, what }) = outcome else { return outcome };
         let (power, axes) = match vertical {
             true => (&mut coarsening.vertical, "z"),
@@ -161,20 +142,6 @@ pub(crate) fn run_until_it_fits(
 pub(crate) fn may_coarsen(options: &JobOptions, vertical: bool) -> bool {
     let set = if vertical { options.input.resolution_z } else { options.input.resolution };
     set.step().is_none()
-}
-
-/// Returns how much coarser the lattice is than the inputs ask for, and whether the job is one part, as far as an earlier run of the same
-/// job has found out.
-pub(crate) fn coarsening_of(
-    directory: &JobDirectory,
-    earlier: Option<&EarlierRun>,
-    fingerprint: &Fingerprint,
-) -> sys::Result<LatticeCoarsening> {
-    let Some(mut known) = earlier.and_then(|earlier| earlier.coarsening(fingerprint)) else {
-        return Ok(LatticeCoarsening::default());
-    };
-    known.one_part |= SingleProcess::find(directory, 0)? == Some(SingleProcess::AsOnePart);
-    Ok(known)
 }
 
 /// Reads what an earlier run left, unless the job is to start over. If it left all its results, they take their places in any case:
@@ -198,13 +165,15 @@ fn attempt(
     earlier: Option<EarlierRun>,
     lock: Option<Lock>,
 ) -> Result<Report> {
-    let JobRequest { options, run, ref directory, clock, .. } = *job;
+    let JobRequest { options, run, ref directory, clock, is_by_tasks, .. } = *job;
     let header =
         JobHeader { fingerprint: job.fingerprint.clone(), coarsening, id: 0, submission: job.submission, begun: None };
     let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
-    let mut plan = match earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options)) {
+    let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
+    let has_plan = known.is_some();
+    let mut plan = match known {
         Some(plan) => plan,
-        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
+        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening))?,
     };
     check_inputs_are_no_results(&plan)?;
     plan.warnings.extend(job.modified.clone());
@@ -214,9 +183,8 @@ fn attempt(
     let planned = stage.finish();
     let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));
     note_skipped(&plan.skipped, progress);
-    plan.freed_steps().iter().for_each(|what| progress.note(what));
     let threads = workers(options, plan.records)?;
-    if !run.force && job.work == EarlierWork::Interrupted {
+    if !run.force && !is_by_tasks {
         on_threads(threads, || require_memory_and_disk(&plan, threads))?;
     }
     check_results_are_ours(directory, options.output.page)?;
@@ -234,7 +202,7 @@ fn attempt(
         progress.note(NO_LOCKS);
     }
     // Tasks have worked since the plan, and this process only ends it.
-    let begun = earlier.as_ref().filter(|_| job.work == EarlierWork::ByTasks).and_then(|earlier| earlier.begun());
+    let begun = earlier.as_ref().filter(|_| is_by_tasks).and_then(|earlier| earlier.begun());
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
         progress.note("the interrupted run had written all its results");
@@ -242,21 +210,13 @@ fn attempt(
         return Ok(report);
     }
     job.triangulator.prepare(plan.records, threads);
-    let is_one_part = plan.is_one_part();
+    let keeps_mesh = plan.keeps_mesh();
     on_threads(threads, || {
-        let start = match is_one_part {
-            true => resume::start(directory, &header, earlier, options.output.max_edge, run.progress)?,
-            // That tasks have done steps is nothing to tell.
-            false if job.work == EarlierWork::ByTasks => {
-                start_parts(directory, &header, earlier, ProgressOutput::Quiet)?
-            }
-            false => start_parts(directory, &header, earlier, run.progress)?,
-        };
-        let RunStart { store, journal, partition, job_id, resumed } = start;
-        let context = RunContext {
+        let start = start(directory, &header, earlier, has_plan, is_by_tasks, run.progress)?;
+        let RunStart { journal, job_id, resumed } = start;
+        let whole_run = WholeRun {
             triangulator: &job.triangulator,
             directory,
-            store: &store,
             journal: &journal,
             progress,
             threads,
@@ -264,32 +224,33 @@ fn attempt(
             begun,
             identity: job.fingerprint.identity(options, job.submission)?,
             job_id,
-            resumed: if job.work == EarlierWork::ByTasks { 0 } else { journal.taken_over() + resumed },
-            is_by_tasks: job.work == EarlierWork::ByTasks,
-            temporary: TemporaryBytes::default(),
+            // That tasks have done phases is nothing to tell.
+            resumed: if is_by_tasks { 0 } else { resumed },
             stages: Mutex::new(vec![planned]),
         };
-        let outcome = (job.walk)(&context, plan, partition);
-        drop(context);
-        // Finished steps reach the disk before a message says that they are kept.
-        let of_parts = || StepsOfParts::of(directory, job_id).map_or(0, |steps| steps.count);
-        let steps = journal.close() + outcome.as_ref().err().map_or(0, |_| of_parts());
-        // An open file is not freed when it is removed.
-        drop(store);
-        end(directory, outcome, steps, job.work, is_one_part)
+        // What tasks left was not compared with its hashes, and a disk may fail meanwhile.
+        let outcome = do_phases(&whole_run, plan).map_err(|error| match error {
+            error if resumed > 0 && is_damage(&error, directory) => Error::DamagedSteps,
+            error => error,
+        });
+        drop(whole_run);
+        // If the journals cannot be read now, something may be kept.
+        let of_parts = || PartJournals::of(directory, job_id).map_or(1, |parts| parts.len());
+        let complete = journal.complete() + outcome.as_ref().err().map_or(0, |_| of_parts());
+        drop(journal);
+        end(directory, outcome, complete, is_by_tasks, keeps_mesh)
     })
 }
 
-/// Ends an attempt: puts the results in place, or keeps the finished steps if the job can go on from them. Removes everything else, but
+/// Ends an attempt: puts the results in place, or keeps the complete phases if the job can go on from them. Removes everything else, but
 /// never the work of tasks after an error.
 fn end(
     directory: &JobDirectory,
     outcome: Result<Report>,
-    steps: u64,
-    work: EarlierWork,
-    is_one_part: bool,
+    phases: u64,
+    is_by_tasks: bool,
+    keeps_mesh: bool,
 ) -> Result<Report> {
-    let is_by_tasks = work == EarlierWork::ByTasks;
     let outcome = outcome.and_then(|report| match place_results_of_finished_job(directory) {
         Err(sys::Error::Io { source, .. }) if is_by_tasks && source.kind() == std::io::ErrorKind::NotFound => {
             Err(Error::DamagedSteps)
@@ -298,10 +259,10 @@ fn end(
     });
     match outcome {
         Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),
-        // With a corrected configuration a job of several parts may start over, so nothing is promised.
-        Err(why @ Error::System(sys::Error::Config(_))) if steps > 0 && !is_one_part => Err(why),
-        Err(why) if may_go_on(&why) && steps > 0 => {
-            Err(Error::Resumable { why: Box::new(why), steps, job: directory.job().into() })
+        // With a corrected configuration a job that has freed its mesh may start over, so nothing is promised.
+        Err(why @ Error::System(sys::Error::Config(_))) if phases > 0 && !keeps_mesh => Err(why),
+        Err(why) if may_go_on(&why) && phases > 0 => {
+            Err(Error::Resumable { why: Box::new(why), phases, job: directory.job().into() })
         }
         outcome => {
             let cleaned = remove_job(directory);
@@ -311,7 +272,12 @@ fn end(
     }
 }
 
-/// Tells whether another run can make use of the finished steps: with the same options, or with others for how tiles look.
+/// Tells whether another run can make use of the complete phases: with the same options, or with others for how tiles look.
 fn may_go_on(why: &Error) -> bool {
-    why.kind() == ErrorKind::Retry || matches!(why, Error::System(sys::Error::Config(_) | sys::Error::Io { .. }))
+    match why {
+        // The next attempt measures the inputs and starts over.
+        Error::OtherThanClaimed { .. } => false,
+        Error::System(sys::Error::Config(_) | sys::Error::Io { .. }) => true,
+        _ => why.kind() == ErrorKind::Retry,
+    }
 }

@@ -9,7 +9,7 @@ use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::records::{JobStep, StepRecord};
 use crate::report::job_report::Report;
-use crate::run::single_process::SingleProcess;
+use crate::run::single_process;
 use std::io::ErrorKind;
 use sys::threads::on_threads;
 use sys::{Error, Result, disk};
@@ -38,7 +38,7 @@ pub(crate) fn results_in_place(
     is_under_way: impl FnOnce() -> Result<bool>,
 ) -> Result<InPlace> {
     let waiting = directory.output().report();
-    if disk::exists(&waiting).map_err(Error::io("read", &waiting))? || SingleProcess::find(directory, 0)?.is_some() {
+    if disk::exists(&waiting).map_err(Error::io("read", &waiting))? || single_process::is_noted(directory, 0)? {
         return Ok(InPlace::Nothing);
     }
     let path = directory.results().report();
@@ -86,7 +86,7 @@ pub(crate) fn known_submission(directory: &JobDirectory) -> Result<u64> {
         text => serde_json::from_slice::<Report>(&text.map_err(Error::io("read", &path))?).ok(),
     };
     let of_report = report.map_or(0, |report| report.submission);
-    Ok(of_report.max(SingleProcess::submission(directory)?))
+    Ok(of_report.max(single_process::submission(directory)?))
 }
 
 /// Tells whether the job directory holds nothing but the rest of a finished job: neither a note nor the journal of a job that has not
@@ -98,8 +98,9 @@ pub(crate) fn is_rest(directory: &JobDirectory) -> Result<bool> {
     if disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.is_empty() {
         return Ok(false);
     }
-    let journal = journal::read_steps::<JobHeader, JobStep, StepRecord>(directory, |step| step == JobStep::Report)?;
-    Ok(SingleProcess::find(directory, 0)?.is_none() && journal.is_none_or(|(_, entries)| !entries.is_empty()))
+    let journal = journal::read::<JobHeader, JobStep, StepRecord>(directory)?;
+    let is_over = journal.is_none_or(|(_, entries)| entries.iter().any(|entry| entry.step == JobStep::Report));
+    Ok(!single_process::is_noted(directory, 0)? && is_over)
 }
 
 /// Ends the removal of the rest of a finished job, if one is there.

@@ -4,7 +4,7 @@ use crate::durable::directory::{JobDirectory, STORE_FILES};
 use crate::durable::journal;
 use crate::durable::journal::PublishedFile;
 use crate::index::PartIndex;
-use crate::records::{JobStep, Journal, JournalEntry, RecordRef, StepRecord, Store};
+use crate::records::{JobStep, JournalEntry, RecordRef, StepRecord, Store};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use sys::Result;
@@ -22,88 +22,51 @@ pub(crate) struct PartHeader {
 /// # Errors
 /// [`sys::Error::Io`] if it cannot be read.
 pub(crate) fn entries_of(directory: &JobDirectory, header: PartHeader) -> Result<Vec<JournalEntry>> {
-    entries_if(directory, |found| found == header)
-}
-
-/// Returns those entries of the journal in `directory` that are of `wanted` steps, if it is the journal of `header`.
-///
-/// # Errors
-/// [`sys::Error::Io`] if it cannot be read.
-pub(crate) fn entries_of_steps(
-    directory: &JobDirectory,
-    header: PartHeader,
-    wanted: impl Fn(JobStep) -> bool,
-) -> Result<Vec<JournalEntry>> {
     // Another machine may have written it.
     directory.probe()?;
-    let read = journal::read_steps::<PartHeader, JobStep, StepRecord>(directory, wanted)?;
+    let read = journal::read::<PartHeader, JobStep, StepRecord>(directory)?;
     let own = read.filter(|(found, _)| *found == Some(header));
     Ok(own.map(|(_, entries)| entries).unwrap_or_default())
 }
 
-fn entries_if(directory: &JobDirectory, is_wanted: impl Fn(PartHeader) -> bool) -> Result<Vec<JournalEntry>> {
-    directory.probe()?;
-    let read = journal::read::<PartHeader, JobStep, StepRecord>(directory)?;
-    let own = read.filter(|(found, _)| found.is_some_and(is_wanted));
-    Ok(own.map(|(_, entries)| entries).unwrap_or_default())
-}
-
-/// What the journals of all parts of a job name.
+/// The journals of all parts of a job, and of the nodes above them.
 #[derive(Default)]
-pub(crate) struct StepsOfParts {
-    /// The number of finished steps.
-    pub(crate) count: u64,
-    /// The results.
-    pub(crate) files: Vec<PublishedFile>,
-}
+pub(crate) struct PartJournals(pub(crate) Vec<(JobDirectory, PartHeader, Vec<JournalEntry>)>);
 
-impl StepsOfParts {
-    /// Reads the journals of all parts of `job`.
+impl PartJournals {
+    /// Reads those of the job with the number `job`.
     ///
     /// # Errors
     /// [`sys::Error::Io`] if one cannot be read.
-    pub(crate) fn of(directory: &JobDirectory, job: u64) -> Result<StepsOfParts> {
-        let mut steps = StepsOfParts::default();
+    pub(crate) fn of(directory: &JobDirectory, job: u64) -> Result<PartJournals> {
+        let mut journals = Vec::new();
         for folder in directory.folders_of_parts()? {
-            let entries = entries_if(&folder, |found| found.job == job)?;
-            steps.count += entries.len() as u64;
-            let files = entries.into_iter().flat_map(|entry| entry.files);
-            steps.files.extend(files.filter(|file| directory.is_result(&file.name)));
+            folder.probe()?;
+            let read = journal::read::<PartHeader, JobStep, StepRecord>(&folder)?;
+            if let Some((Some(header), entries)) = read.filter(|(found, _)| found.is_some_and(|found| found.job == job))
+            {
+                journals.push((folder, header, entries));
+            }
         }
-        Ok(steps)
+        Ok(PartJournals(journals))
     }
-}
 
-/// Removes the steps that make coarser tiles from the journals of all parts: with another memory limit others are left out.
-///
-/// # Errors
-/// [`sys::Error::Io`] if a journal cannot be read or written.
-pub(crate) fn forget_levels(directory: &JobDirectory) -> Result<()> {
-    for folder in directory.folders_of_parts()? {
-        let read = journal::read::<PartHeader, JobStep, StepRecord>(&folder)?;
-        if let Some((Some(header), mut entries)) = read {
-            entries.retain(|entry| !matches!(entry.step, JobStep::Level(_) | JobStep::Levels));
-            Journal::begin(&folder, &header, entries)?.close();
-        }
+    /// Returns the number of phases that are complete.
+    pub(crate) fn len(&self) -> u64 {
+        self.0.iter().map(|(_, _, entries)| entries.len() as u64).sum()
     }
-    Ok(())
-}
 
-/// Tells whether the records and the files of a step hold what was written.
-pub(crate) fn is_whole(directory: &JobDirectory, store: &Store, entry: &JournalEntry) -> bool {
-    entry.records.iter().all(|record| store.is_whole(record)) && entry.files.iter().all(|file| file.is_whole(directory))
-}
-
-/// Returns the records that `entries` name.
-pub(crate) fn records_of(entries: &[JournalEntry]) -> Vec<RecordRef> {
-    entries.iter().flat_map(|entry| &entry.records).copied().collect()
+    /// Returns the results that they name.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PublishedFile> {
+        self.0.iter().flat_map(|(_, _, entries)| entries).flat_map(|entry| &entry.files)
+    }
 }
 
 /// Opens the store in `directory` with these records.
 ///
 /// # Errors
 /// [`sys::Error::Io`].
-pub(crate) fn open_store(directory: &JobDirectory, records: &[RecordRef]) -> Result<Store> {
+pub(crate) fn open_store(directory: &JobDirectory, records: impl IntoIterator<Item = RecordRef>) -> Result<Store> {
     let paths: [PathBuf; STORE_FILES] = directory.store();
-    if records.is_empty() { Store::create(paths) } else { Store::open(paths, records.iter()) }
+    Store::open(paths, records)
 }

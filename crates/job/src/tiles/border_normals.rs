@@ -5,7 +5,7 @@ use crate::index::TileIndex;
 use crate::merge_records::{Frontier, SeamOfTile};
 use crate::partition::tree::Tree;
 use crate::records::{
-    BorderAttributes, BorderVertex, FinishedBorder, Leaf, PartialNormals, SeamTriangle, StepOutput, Store, owner,
+    BorderAttributes, BorderVertex, FinishedBorder, Leaf, PartialNormals, SeamTriangle, Store, owner,
 };
 use crate::tiles::hull_slivers::HullSlivers;
 use crate::tiles::style::TileStyle;
@@ -24,9 +24,9 @@ pub(crate) fn finish_border_normals(
     style: &TileStyle,
     tile: TileIndex,
     seam: &SeamOfTile,
-) -> Result<StepOutput<Vec<TileIndex>>> {
-    let border = finished_border(store, tree, style, tile, seam)?;
-    Ok(StepOutput::new(neighbours(&seam.triangles, tile), vec![border.save(store, tile)?]))
+) -> Result<Vec<TileIndex>> {
+    finished_border(store, tree, style, tile, seam)?.save(store, tile)?;
+    Ok(neighbours(&seam.triangles, tile))
 }
 
 /// Returns the finished frontier of `tile`, whose seam is `seam`.

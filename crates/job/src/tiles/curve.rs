@@ -20,11 +20,6 @@ pub(crate) const ONE_TRANSFORM: f64 = 1.0;
 /// zone, some metres. With one transform tiles meet exactly, which is worth more than these.
 pub(crate) const ONE_TRANSFORM_SIDEWAYS: f64 = 5.0;
 
-/// Tells whether the scene of a job may be bent, if the terrain is wide.
-pub(crate) fn may_be_bent(plan: &Plan) -> bool {
-    bendable(plan).is_some()
-}
-
 /// Returns the projected system of a scene that may be bent.
 fn bendable(plan: &Plan) -> Option<GlobeSystem> {
     let system = globe_system(&plan.crs, plan.frame.extras().metres_per_unit).ok();

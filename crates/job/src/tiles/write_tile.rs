@@ -6,7 +6,7 @@ use crate::durable::columns::ColumnWriter;
 use crate::durable::directory::JobDirectory;
 use crate::index::TileIndex;
 use crate::merge_records::SeamOfTile;
-use crate::records::{FinishedBorder, Leaf, StepOutput, StepRecord, Store, TileSummary, owner};
+use crate::records::{FinishedBorder, Leaf, StepRecord, Store, TileSummary, owner};
 use crate::tiles::hull_slivers::HullSlivers;
 use crate::tiles::style::TileStyle;
 use crate::tiles::tile_content::{BorderOf, TileContent};
@@ -60,7 +60,7 @@ pub(crate) fn write_tile(
     tile: TileIndex,
     seam: &SeamOfTile,
     border_of: BorderOf,
-) -> Result<StepOutput<TileStats>> {
+) -> Result<(TileStats, Vec<PendingFile>)> {
     let leaf = Leaf::load(store, tile)?;
     let border = FinishedBorder::load(store, tile)?;
     let slivers = HullSlivers::new(style.hull, &seam.trimmed);
@@ -78,9 +78,9 @@ pub(crate) fn write_tile(
     };
     let mut pixels = canvas.draw(&kept)?;
     pixels.extend(canvas.dots(&kept, pixels.len()));
-    let pixels = ColumnWriter::default().push(&pixels).write(store, StepRecord::Pixels(tile))?;
+    ColumnWriter::default().push(&pixels).write(store, StepRecord::Pixels(tile))?;
     let vertices = if kept.triangles.is_empty() { 0 } else { kept.positions.len() };
-    let summary = TileSummary::new(kept.bounds(), vertices).save(store, tile)?;
+    TileSummary::new(kept.bounds(), vertices).save(store, tile)?;
     let mut files = Vec::new();
     if vertices > 0 {
         files.push(write_glb(&directory.output().tile(tile.number()), &kept, style)?);
@@ -90,7 +90,7 @@ pub(crate) fn write_tile(
         files.push(write_glb(&directory.output().cut_tile(tile.number()), &left_out, style)?);
     }
     stats.bytes = files.iter().map(|file| file.bytes).sum();
-    Ok(StepOutput { files, ..StepOutput::new(stats, vec![pixels, summary]) })
+    Ok((stats, files))
 }
 
 thread_local! {

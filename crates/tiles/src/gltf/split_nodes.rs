@@ -80,15 +80,15 @@ fn too_long(frame: &Frame, corners: [[i32; 3]; 3]) -> Error {
     let (length, limit) = (frame.metres([0, 1, 2].map(|k| high[k] - low[k])), frame.longest_triangle());
     let factor = [length[0] / limit[0], length[2] / limit[0], length[1] / limit[1]].into_iter().fold(1.0, f64::max);
     let extras = frame.extras();
-    let (resolution, key, extent) = if length[1] / limit[1] == factor {
-        (extras.resolution_z, "in z", length[1])
+    let (resolution, axes, key, extent) = if length[1] / limit[1] == factor {
+        (extras.resolution_z, "in z", "resolution_z", length[1])
     } else {
-        (extras.resolution, "in x and y", length[0].max(length[2]))
+        (extras.resolution, "in x and y", "resolution", length[0].max(length[2]))
     };
     let workable = coarser(resolution, factor);
     Error::Config(format!(
-        "a triangle that is {extent:.1} m long cannot be written exactly with a resolution of {resolution} {key} \
-         (glTF has 24 binary digits for a coordinate): set [input] resolution = {workable} or coarser, or leave out \
+        "a triangle that is {extent:.1} m long cannot be written exactly with a resolution of {resolution} {axes} \
+         (glTF has 24 binary digits for a coordinate): set [input] {key} = {workable} or coarser, or leave out \
          the far-off points with bounds"
     ))
 }

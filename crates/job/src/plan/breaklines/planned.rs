@@ -47,8 +47,8 @@ pub struct PlannedBreaklines {
 }
 
 /// What breaklines are cut from. The same gives the same sites.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct CutFrom {
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct CutFrom {
     features: Vec<Feature>,
     options: BreaklineOptions,
     /// The points that gave heights to the sites of lines that have none.
@@ -110,11 +110,6 @@ impl PlannedBreaklines {
             cut_from: CutFrom { features, options, nearest: nearest.found().to_vec() },
             built: OnceLock::from(Arc::new(built)),
         }))
-    }
-
-    /// Returns what they are cut from.
-    pub(crate) fn cut_from(&self) -> &CutFrom {
-        &self.cut_from
     }
 
     /// Returns the breaklines.

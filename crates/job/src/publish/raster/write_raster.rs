@@ -12,7 +12,6 @@ use crate::publish::raster::system::{system_of, system_warning};
 use crate::publish::raster::tile_meshes::{TileBox, boxes, lattice_mesh};
 use crate::publish::raster::waiting_blocks::WaitingBlocks;
 use crate::publish::side_files::EachTile;
-use crate::records::StepOutput;
 use delaunay::geometry::Bounds;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
@@ -115,7 +114,11 @@ impl<'a> RasterWork<'a> {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] on a file, [`Error::Interrupted`].
-    pub(crate) fn write(&self, directory: &JobDirectory, done: &(dyn Fn() + Sync)) -> Result<StepOutput<RasterStats>> {
+    pub(crate) fn write(
+        &self,
+        directory: &JobDirectory,
+        done: &(dyn Fn() + Sync),
+    ) -> Result<(RasterStats, Vec<PendingFile>)> {
         let mut stats = RasterStats { size: self.grid.size(), ..RasterStats::default() };
         let (mut files, mut listed) = (Vec::new(), Vec::new());
         for part in self.parts() {
@@ -128,7 +131,7 @@ impl<'a> RasterWork<'a> {
             files.push(self.write_list(directory, listed)?);
         }
         stats.bytes = files.iter().map(|file| file.bytes).sum();
-        Ok(StepOutput { files, ..StepOutput::new(stats, Vec::new()) })
+        Ok((stats, files))
     }
 
     /// Returns the tiles that may cover cells of a file, with the cells counted from its own first.

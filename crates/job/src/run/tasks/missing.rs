@@ -8,9 +8,9 @@ use crate::plan::budget::workers;
 use crate::plan::fingerprint::Fingerprint;
 use crate::records::JobStep;
 use crate::run::finished::{InPlace, is_rest};
-use crate::run::part_entries::{PartHeader, entries_of_steps};
-use crate::run::parts::done::PartProgress;
-use crate::run::single_process::SingleProcess;
+use crate::run::part_entries::{PartHeader, entries_of};
+use crate::run::phases::part_progress::PartProgress;
+use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
 use crate::run::tasks::finished_job::in_place;
 use crate::run::tasks::planned_job::{PlannedJob, planned};
@@ -46,8 +46,9 @@ impl<'a> JobProgressByPart<'a> {
         };
         let parts = job.parts.all().map(part).collect::<Result<_>>()?;
         let above = header(PartIndex::new(job.parts.all().len()));
-        let joined = entries_of_steps(&job.directory.join(), above, |step| step == JobStep::Join)?;
-        Ok(JobProgressByPart { job, parts, is_joined: !joined.is_empty() })
+        let joined = entries_of(&job.directory.join(), above)?;
+        let is_joined = joined.iter().any(|entry| entry.step == JobStep::Join);
+        Ok(JobProgressByPart { job, parts, is_joined })
     }
 
     /// Tells whether `phase`, which has one task, is done.
@@ -126,7 +127,12 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
     let known = planned(&directory, 0)?;
     let is_same = known.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
-    if is_same { missing_tasks_of_planned(options, tasks) } else { Ok(PhaseTasks::all(tasks)) }
+    // One process may have begun a small job, which has no tasks.
+    if is_same && PlannedJob::open(&directory, options, 0)?.is_some() {
+        missing_tasks_of_planned(options, tasks)
+    } else {
+        Ok(PhaseTasks::all(tasks))
+    }
 }
 
 /// Returns all phases of a job that is planned with the tasks that are missing.
@@ -136,7 +142,7 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
 pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     let directory = JobDirectory::new(&options.output.directory);
     let only_publish = || of_each(tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() });
-    if SingleProcess::find(&directory, 0)?.is_some() {
+    if single_process::is_noted(&directory, 0)? {
         return Ok(only_publish());
     }
     match PlannedJob::open(&directory, options, 0)? {

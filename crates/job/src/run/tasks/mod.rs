@@ -19,20 +19,20 @@ use crate::phase::{Phase, Task};
 use crate::progress::clock::JobClock;
 use crate::report::job_report::Report;
 use crate::report::task_outcome::{DoneTask, TaskOutcome};
-use crate::run::attempt::{EarlierWork, Walk, run_until_it_fits};
+use crate::run::attempt::run_until_it_fits;
 use crate::run::finished::{InPlace, remove_rest};
-use crate::run::single_process::SingleProcess;
+use crate::run::single_process;
 use crate::run::tasks::finished_job::in_place;
 use crate::run::tasks::missing::{JobProgressByPart, not_planned};
 use crate::run::tasks::part_tasks::work_on_parts;
 use crate::run::tasks::plan_task::plan;
 use crate::run::tasks::planned_job::PlannedJob;
 
-/// Does one task of one phase of a job. `walk` is what a process does that does all of it.
+/// Does one task of one phase of a job.
 ///
 /// # Errors
 /// See [`crate::work`].
-pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Task, walk: Walk) -> Result<TaskOutcome> {
+pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Task) -> Result<TaskOutcome> {
     let clock = JobClock::start();
     let mut done = DoneTask::new(phase, task);
     // A phase with one task is done by the first.
@@ -46,8 +46,7 @@ pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Ta
             }
             (_, InPlace::ThisJob(_)) => done.note = Some("nothing to do: all results are in place".into()),
             (Phase::Publish, _) => {
-                return publish(directory, options, run, task, walk)
-                    .map(|report| TaskOutcome::Published(report.into()));
+                return publish(directory, options, run, task).map(|report| TaskOutcome::Published(report.into()));
             }
             (Phase::Plan, _) => done.note = plan(options, run)?,
             (_, _) => (done.parts, done.note) = work_on_parts(options, run, phase, task)?,
@@ -58,17 +57,14 @@ pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Ta
 }
 
 /// Publishes a job whose other phases are complete, or does all of a job that tasks have left to one process.
-fn publish(directory: &JobDirectory, options: &JobOptions, run: RunOptions, task: Task, walk: Walk) -> Result<Report> {
-    let work = match SingleProcess::find(directory, run.submission)? {
-        Some(_) => EarlierWork::Interrupted,
-        None => {
-            let job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
-            if !job.is_complete {
-                let progress = JobProgressByPart::of(&job)?;
-                Phase::ALL[..6].iter().try_for_each(|&phase| progress.require(phase, task.count, |_| true))?;
-            }
-            EarlierWork::ByTasks
+fn publish(directory: &JobDirectory, options: &JobOptions, run: RunOptions, task: Task) -> Result<Report> {
+    let is_by_tasks = !single_process::is_noted(directory, run.submission)?;
+    if is_by_tasks {
+        let job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
+        if !job.is_complete {
+            let progress = JobProgressByPart::of(&job)?;
+            Phase::ALL[..6].iter().try_for_each(|&phase| progress.require(phase, task.count, |_| true))?;
         }
-    };
-    run_until_it_fits(options, run, walk, work)
+    }
+    run_until_it_fits(options, run, is_by_tasks)
 }

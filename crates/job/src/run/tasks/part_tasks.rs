@@ -10,17 +10,17 @@ use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
 use crate::run::attempt::{NO_LOCKS, may_coarsen};
 use crate::run::damage::{damaged_by_tasks, is_cut_off};
-use crate::run::parts::appearance::{SitesOfParts, early_appearance};
-use crate::run::parts::done::PartProgress;
-use crate::run::parts::join::{JoinedParts, join_parts};
-use crate::run::parts::level_phase::levels_of_part;
-use crate::run::parts::mesh_phase::{drop_damaged_steps, mesh_one};
-use crate::run::parts::part_store::PartStores;
-use crate::run::parts::parts_job::PartsJob;
-use crate::run::parts::read_phase::{read_for, sum_up};
-use crate::run::parts::tile_phase::{ForeignBorders, finish_part};
-use crate::run::publish_step::wants_tileset;
-use crate::run::single_process::SingleProcess;
+use crate::run::job::Job;
+use crate::run::phases::appearance::{SitesOfParts, early_appearance};
+use crate::run::phases::join::{JoinedParts, join_parts};
+use crate::run::phases::level_phase::levels_of_part;
+use crate::run::phases::mesh_phase::mesh_one;
+use crate::run::phases::part_progress::PartProgress;
+use crate::run::phases::part_store::PartStores;
+use crate::run::phases::publish_phase::wants_tileset;
+use crate::run::phases::read_phase::{read_for, sum_up};
+use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
+use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
 use crate::run::tasks::missing::{JobProgressByPart, not_planned, too_early};
 use crate::run::tasks::planned_job::PlannedJob;
@@ -47,8 +47,8 @@ pub(crate) fn work_on_parts(
     if !lock.is_real() {
         run.progress.note(NO_LOCKS);
     }
-    if SingleProcess::find(directory, run.submission)?.is_some() {
-        return Ok((0, Some(format!("nothing to do: {}", SingleProcess::SENTENCE))));
+    if single_process::is_noted(directory, run.submission)? {
+        return Ok((0, Some(format!("nothing to do: {}", single_process::SENTENCE))));
     }
     let mut job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
     if job.is_complete {
@@ -64,15 +64,16 @@ pub(crate) fn work_on_parts(
     }
     let worked =
         on_threads(workers(options, job.plan.records)?, || PartTask { job: &job, run, phase, task }.work(&mine));
-    let (alone, why) = match worked {
-        Err(Error::NeedsOnePart) => (SingleProcess::AsOnePart, "what was read contradicts the header of a file".into()),
-        Err(Error::TooFine { vertical, what }) if may_coarsen(options, vertical) => (SingleProcess::AsPlanned, what),
+    let why = match worked {
+        Err(Error::OtherThanClaimed { is_bad_file: true }) => "a file is bad and will be left out".into(),
+        Err(Error::OtherThanClaimed { is_bad_file: false }) => "what was read contradicts the header of a file".into(),
+        Err(Error::TooFine { vertical, what }) if may_coarsen(options, vertical) => what,
         Err(Error::DamagedSteps) => return Err(damaged_by_tasks(directory)),
         Err(error) if is_cut_off(&error, directory) => return Err(damaged_by_tasks(directory)),
         worked => return worked.map(|()| (mine.len() as u64, None)),
     };
-    alone.note(directory, job.header.submission)?;
-    Ok((mine.len() as u64, Some(format!("{why}; {}", SingleProcess::SENTENCE))))
+    single_process::leave_note(directory, job.header.submission)?;
+    Ok((mine.len() as u64, Some(format!("{why}; {}", single_process::SENTENCE))))
 }
 
 /// Returns the parts of `phase` that fall to `task`. A phase with one task does all.
@@ -85,7 +86,7 @@ fn parts_of(job: &PlannedJob, phase: Phase, task: Task) -> Vec<PartIndex> {
 fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
     let journal = directory.journal();
     let is_there = disk::list(directory.job()).map_err(sys::Error::io("read", directory.job()))?.contains(&journal);
-    let is_left = || SingleProcess::find(directory, submission).map(|alone| alone.is_some());
+    let is_left = || single_process::is_noted(directory, submission);
     if is_there || is_left()? { directory.share_lock().map(Some) } else { Ok(None) }
 }
 
@@ -108,7 +109,7 @@ impl PartTask<'_> {
             _ => Triangulator::without_gpu(&options.triangulation),
         };
         triangulator.prepare(mine.iter().map(|&part| self.job.parts.expected_points(part)).sum(), threads);
-        let job = &PartsJob {
+        let job = &Job {
             plan: &self.job.plan,
             parts: &self.job.parts,
             directory: &self.job.directory,
@@ -116,10 +117,9 @@ impl PartTask<'_> {
             progress: &JobProgress::new(self.run.progress, clock, Vec::new()),
             threads,
             clock,
-            job_id: self.job.header.id,
-            resumed: 0,
-            checks: true,
-            journal: None,
+            id: self.job.header.id,
+            checks_points: true,
+            is_task: true,
         };
         match self.phase {
             Phase::Read => self.each(mine, |part| read_for(job, part, 0).map(|_| ())),
@@ -146,7 +146,7 @@ impl PartTask<'_> {
         in_use.map_or(Ok(()), Err)
     }
 
-    fn mesh(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
+    fn mesh(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
         let readers: Vec<PartIndex> = mine.iter().flat_map(|&part| job.parts.readers_of(part)).collect();
         let is_reader = |part: PartIndex| readers.contains(&part);
         JobProgressByPart::of_parts(self.job, is_reader)?.require(Phase::Read, self.task.count, is_reader)?;
@@ -154,31 +154,24 @@ impl PartTask<'_> {
         self.each(mine, |part| mesh_one(job, part, appearance.as_ref(), None).map(|_| ()))
     }
 
-    fn join(&self, job: &PartsJob) -> Result<()> {
+    fn join(&self, job: &Job) -> Result<()> {
         let progress = JobProgressByPart::of(self.job)?;
         let tasks = self.task.count;
         progress.require(Phase::Read, tasks, |_| true)?;
         progress.require(Phase::Mesh, tasks, |_| true)?;
-        let (_, bounds) = sum_up(job, progress.parts.iter().filter_map(|part| Some(&part.read.as_ref()?.figures)))?;
-        let mesh = progress.parts.iter().filter_map(|part| Some(&part.mesh.as_ref()?.figures));
-        let stores = &PartStores::new(job.directory, job.job_id);
-        join_parts(job, stores, SitesOfParts { sites: mesh.map(|mesh| mesh.leaves.sites).sum(), bounds })
+        let (_, bounds) = sum_up(job, progress.parts.iter().filter_map(|part| part.read.as_ref()))?;
+        let mesh = progress.parts.iter().filter_map(|part| part.mesh.as_ref());
+        join_parts(job, &PartStores::new(job), SitesOfParts { sites: mesh.map(|mesh| mesh.leaves.sites).sum(), bounds })
     }
 
-    fn tiles(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
-        let progress = JobProgressByPart::of_parts(self.job, |part| mine.contains(&part))?;
+    fn tiles(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
         let joined = self.joined(job)?;
-        let stores = &PartStores::new(job.directory, job.job_id);
+        let stores = &PartStores::new(job);
         let borders = &ForeignBorders::new(job, stores, &joined);
-        self.each(mine, |part| {
-            let own = &progress.parts[part.get()];
-            let (None, Some(mesh)) = (&own.tiles, &own.mesh) else { return Ok(()) };
-            drop_damaged_steps(job, part)?;
-            finish_part(borders, part, &mesh.figures.waiting, None).map(|_| ())
-        })
+        self.each(mine, |part| finish_part(borders, part).map(|_| ()))
     }
 
-    fn levels(&self, job: &PartsJob, mine: &[PartIndex]) -> Result<()> {
+    fn levels(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
         // With this format, the size of all tiles together tells whether one file holds them.
         let needs_all = job.plan.options.output.format == OutputFormat::Glb;
         let needs = |part: PartIndex| needs_all || mine.contains(&part);
@@ -186,17 +179,11 @@ impl PartTask<'_> {
         let joined = self.joined(job)?;
         progress.require(Phase::Tiles, self.task.count, needs)?;
         let has_tileset = wants_tileset(job.plan, &tiles_of(&progress.parts));
-        let stores = &PartStores::new(job.directory, job.job_id);
-        self.each(mine, |part| {
-            if progress.parts[part.get()].levels.is_some() {
-                return Ok(());
-            }
-            drop_damaged_steps(job, part)?;
-            levels_of_part(job, stores, &joined, part, has_tileset).map(|_| ())
-        })
+        let stores = &PartStores::new(job);
+        self.each(mine, |part| levels_of_part(job, stores, &joined, part, has_tileset).map(|_| ()))
     }
 
-    fn joined(&self, job: &PartsJob) -> Result<JoinedParts> {
+    fn joined(&self, job: &Job) -> Result<JoinedParts> {
         JoinedParts::open(job)?.ok_or_else(|| too_early(Phase::Join, &[1], 1))
     }
 }
@@ -204,9 +191,6 @@ impl PartTask<'_> {
 /// Returns the totals over all tiles that are written.
 fn tiles_of(parts: &[PartProgress]) -> TileStats {
     let mut all = TileStats::default();
-    for part in parts {
-        part.mesh.iter().for_each(|mesh| all += mesh.figures.tiles);
-        part.tiles.iter().for_each(|tiles| all += tiles.figures);
-    }
+    parts.iter().for_each(|part| all += part.tiles.stats);
     all
 }

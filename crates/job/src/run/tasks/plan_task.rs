@@ -6,6 +6,7 @@ use crate::options::{JobOptions, RunOptions};
 use crate::partition::parts::Parts;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
+use crate::plan::job_plan::Plan;
 use crate::plan::make_plan::make_plan;
 use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::input_places::check_inputs_are_no_results;
@@ -13,13 +14,11 @@ use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::raster::check::check_raster;
-use crate::run::attempt::{coarsening_of, read_earlier};
+use crate::run::attempt::read_earlier;
+use crate::run::earlier_run::{EarlierRun, start};
 use crate::run::finished::known_submission;
-use crate::run::parts::write_plan;
-use crate::run::read_step::note_skipped;
-use crate::run::resume::EarlierRun;
-use crate::run::resume_parts::start_parts;
-use crate::run::single_process::SingleProcess;
+use crate::run::phases::plan_phase::{note_skipped, write_plan};
+use crate::run::single_process;
 use crate::run::tasks::planned_job::planned;
 use std::time::SystemTime;
 use sys::threads::on_threads;
@@ -46,37 +45,37 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
         run.progress.note(&format!("changed since the interrupted run: {what}; starting over"));
         earlier.forget();
     }
-    let coarsening = coarsening_of(directory, earlier.as_ref(), &fingerprint)?;
+    let coarsening = earlier.as_ref().and_then(|earlier| earlier.coarsening(&fingerprint)).unwrap_or_default();
     let submission = run.submission.max(known_submission(directory)?);
     let header = JobHeader { fingerprint, coarsening, id: 0, submission, begun: Some(begun) };
     let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
+    let has_plan = known.is_some();
     let plan = match known {
         Some(plan) => plan,
-        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening).map(Parts::cut_or_whole))?,
+        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening))?,
     };
     check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
-    plan.freed_steps().iter().for_each(|what| run.progress.note(what));
     let threads = workers(options, plan.records)?;
     if !run.force {
         on_threads(threads, || require_memory_and_disk(&plan, threads))?;
     }
-    if plan.is_one_part() {
-        SingleProcess::AsPlanned.note(directory, submission)?;
+    if Parts::of(&plan).all().len() == 1 {
+        single_process::leave_note(directory, submission)?;
         return Ok(Some(format!(
             "the job has only {} points, which is one part; {}",
             plan.records,
-            SingleProcess::SENTENCE
+            single_process::SENTENCE
         )));
     }
-    SingleProcess::forget(directory)?;
+    single_process::remove_notes(directory)?;
     on_threads(threads, || {
-        let start = start_parts(directory, &header, earlier, run.progress)?;
-        write_plan(&start.journal, directory, plan)?;
-        start.journal.commit()?;
-        start.journal.close();
+        let start = start(directory, &header, earlier, has_plan, false, run.progress)?;
+        if !has_plan {
+            write_plan(&start.journal, directory, plan)?;
+        }
         Ok(None)
     })
 }
@@ -96,5 +95,6 @@ fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u
     }
     let _lock = directory.share_lock()?;
     let known = planned(directory, submission)?;
-    Ok(known.is_some_and(|(header, _)| fingerprint.is_same_job(&header)))
+    let is_same = known.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
+    Ok(is_same && Parts::of(&Plan::read(&directory.plan())?).all().len() > 1)
 }

@@ -32,7 +32,10 @@ impl PlannedJob {
             return Err(Error::Config(format!("{what}: changed since the job was planned; {PLAN_AGAIN}")));
         }
         let plan = Plan { options: options.clone(), ..Plan::read(&directory.plan())? };
-        Ok(Some(PlannedJob { directory: directory.clone(), header, parts: Parts::of(&plan), plan, is_complete }))
+        let parts = Parts::of(&plan);
+        // One process does a small job.
+        let has_tasks = parts.all().len() > 1;
+        Ok(has_tasks.then(|| PlannedJob { directory: directory.clone(), header, parts, plan, is_complete }))
     }
 
     /// Checks that the inputs of these numbers are those that were planned, and calls them what they are called by now.
@@ -67,13 +70,11 @@ pub(crate) fn planned(directory: &JobDirectory, submission: u64) -> Result<Optio
     // Other machines may have made the folders.
     directory.probe()?;
     disk::list(&directory.parts()).map_err(Error::io("read", directory.parts()))?;
-    let wanted = |step| matches!(step, JobStep::Plan | JobStep::Report);
-    let read = journal::read_steps::<JobHeader, JobStep, StepRecord>(directory, wanted)?;
+    let read = journal::read::<JobHeader, JobStep, StepRecord>(directory)?;
     let Some((Some(header), entries)) = read else { return Ok(None) };
     let is_planned = |step: JobStep| entries.iter().any(|entry| entry.step == step);
     let mut own = entries.iter().flat_map(|entry| &entry.files).filter(|file| !directory.is_result(&file.name));
-    let is_planned_and_whole = header.id != 0
-        && header.submission >= submission
+    let is_planned_and_whole = header.submission >= submission
         && is_planned(JobStep::Plan)
         && own.try_fold(true, |all, file| Ok::<_, Error>(all && file.try_is_whole(directory)?))?;
     Ok(is_planned_and_whole.then(|| (header, is_planned(JobStep::Report))))

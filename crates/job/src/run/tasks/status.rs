@@ -7,7 +7,7 @@ use crate::phase::Phase;
 use crate::report::job_report::SlowestPart;
 use crate::report::job_status::{JobState, JobStatus, PhaseStatus};
 use crate::run::finished::InPlace;
-use crate::run::single_process::SingleProcess;
+use crate::run::single_process;
 use crate::run::tasks::finished_job::in_place;
 use crate::run::tasks::missing::JobProgressByPart;
 use crate::run::tasks::planned_job::PlannedJob;
@@ -22,7 +22,7 @@ pub(crate) fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStat
     let directory = JobDirectory::new(&options.output.directory);
     let output = options.output.directory.clone();
     let simple = |state| JobStatus { output: output.clone(), state, phases: Vec::new(), slowest_part: None };
-    if SingleProcess::find(&directory, 0)?.is_some() {
+    if single_process::is_noted(&directory, 0)? {
         return Ok(simple(JobState::LeftToPublish));
     }
     let without_plan = match in_place(&directory, options, 0)? {
@@ -53,6 +53,6 @@ fn slowest(progress: &JobProgressByPart) -> Option<SlowestPart> {
         seconds.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, seconds)| *seconds > 0.0)?;
     let index = PartIndex::new(part);
     let expected = progress.job.parts.expected_points(index);
-    let points = progress.parts[part].mesh.as_ref().map_or(expected, |mesh| mesh.figures.points);
+    let points = progress.parts[part].mesh.as_ref().map_or(expected, |mesh| mesh.points);
     Some(SlowestPart { part: part as u64, seconds, points })
 }

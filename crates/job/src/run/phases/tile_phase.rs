@@ -1,55 +1,57 @@
-//! The tiles that have waited for other parts.
+//! Steps 5 and 6 for tiles of parts that have waited for other parts.
 
 use crate::durable::directory::JobDirectory;
 use crate::index::{PartIndex, TileIndex};
 use crate::merge_records::SeamOfTile;
 use crate::partition::result::Partition;
+use crate::phase::Phase;
 use crate::progress::stage::Stage;
-use crate::progress::stats::StageStats;
-use crate::records::{FinishedBorder, JobStep, Store};
-use crate::run::part_entries::entries_of;
-use crate::run::parts::done::Done;
-use crate::run::parts::join::JoinedParts;
-use crate::run::parts::part_journal::PartSession;
-use crate::run::parts::part_store::{OpenPart, PartStores};
-use crate::run::parts::parts_job::PartsJob;
-use crate::run::tile_queue::TileAppearance;
+use crate::records::{FinishedBorder, JobStep, StepRecord, Store};
+use crate::run::folder::Folder;
+use crate::run::job::Job;
+use crate::run::phases::join::JoinedParts;
+use crate::run::phases::meshed_part::SomeTiles;
+use crate::run::phases::part_progress::PartProgress;
+use crate::run::phases::part_store::{OpenPart, PartStores};
+use crate::run::phases::tile_queue::TileAppearance;
 use crate::tiles::border_normals::{finish_border_normals, finished_border};
 use crate::tiles::write_tile::{TileStats, write_tile};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
-use sys::Result;
+use sys::{Result, interrupt};
 
-/// Writes the tiles of `part` that have `waiting`, unless that is done. `before` is what writing some of them took already. Returns the
-/// totals over all of them.
+/// Writes the tiles of `part` that are not written yet. Returns the totals over all of them.
 ///
 /// # Errors
 /// Those of the steps; [`crate::Error::InUse`] if another process has the part.
-pub(crate) fn finish_part(
-    borders: &ForeignBorders,
-    part: PartIndex,
-    waiting: &[TileIndex],
-    before: Option<StageStats>,
-) -> crate::Result<TileStats> {
-    let directory = &borders.job.directory.part(part);
-    let entries = entries_of(directory, borders.job.header(part))?;
-    if let Some(done) = Done::find(&entries, JobStep::WriteWaiting)? {
-        return Ok(done.figures);
+pub(crate) fn finish_part(borders: &ForeignBorders, part: PartIndex) -> crate::Result<TileStats> {
+    let (job, directory) = (borders.job, &borders.job.directory.part(part));
+    let progress = PartProgress::of(directory, job.header(part))?;
+    if progress.has(Phase::Tiles) {
+        return Ok(progress.tiles.stats);
     }
-    let session = BorderSession::begin(borders, directory, part, waiting.len())?;
-    session.finish_borders(waiting)?;
-    let stats = session.write_tiles(waiting)?;
-    let BorderSession { session, stage, .. } = session;
-    let mut took = stage.finish();
-    before.iter().for_each(|before| took.add(before));
-    Ok(session.finish(JobStep::WriteWaiting, stats, vec![took], Vec::new())?)
+    let session = BorderSession::open(borders, directory, part, progress.tiles_left())?;
+    // What another process has written since is in the journal that is locked now.
+    let SomeTiles { stats: mut all, written, with_border } = session.open.tiles.clone();
+    let (written, with_border): (HashSet<TileIndex>, HashSet<TileIndex>) =
+        (written.into_iter().collect(), with_border.into_iter().map(|(tile, _)| tile).collect());
+    let waiting: Vec<TileIndex> = session.partition().tree.tiles().filter(|tile| !written.contains(tile)).collect();
+    if waiting.is_empty() {
+        return Ok(all);
+    }
+    let missing: Vec<TileIndex> = waiting.iter().copied().filter(|tile| !with_border.contains(tile)).collect();
+    session.finish_borders(&missing)?;
+    let stats = session.write_tiles(&waiting)?;
+    all += stats;
+    session.finish(SomeTiles { stats, written: waiting, with_border: Vec::new() })?;
+    Ok(all)
 }
 
 /// A part whose waiting tiles this process writes.
 pub(crate) struct BorderSession<'a> {
     borders: &'a ForeignBorders<'a>,
-    session: PartSession<'a>,
+    folder: Folder<'a>,
     open: Arc<OpenPart>,
     part: PartIndex,
     stage: Stage,
@@ -60,26 +62,24 @@ impl<'a> BorderSession<'a> {
     ///
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the folder, [`crate::Error::InUse`] if another process has the part.
-    pub(crate) fn begin(
+    pub(crate) fn open(
         borders: &'a ForeignBorders<'a>,
         directory: &'a JobDirectory,
         part: PartIndex,
         tiles: usize,
     ) -> crate::Result<BorderSession<'a>> {
         let ForeignBorders { job, stores, .. } = *borders;
-        let lock = directory.lock_within()?;
-        let header = job.header(part);
-        let entries = entries_of(directory, header)?;
-        let open = stores.open(part)?;
-        // The store of the part grows, so nobody may go on with what is open now.
+        let folder = Folder::open(job, directory, part)?;
+        // What was opened before may be from before another process wrote here, and the store grows from now on.
         stores.close(part);
-        let session = PartSession::begin(directory, lock, header, entries)?;
-        let stage = job.progress.stage("write borders", tiles as u64, "tiles");
-        Ok(BorderSession { borders, session, open, part, stage })
+        let open = stores.open(part)?;
+        stores.close(part);
+        let stage = job.progress.stage("write tiles", tiles as u64, "tiles");
+        Ok(BorderSession { borders, folder, open, part, stage })
     }
 
     pub(crate) fn store(&self) -> &Store {
-        &self.session.store
+        &self.folder.store
     }
 
     pub(crate) fn partition(&self) -> &Partition {
@@ -99,8 +99,8 @@ impl<'a> BorderSession<'a> {
     pub(crate) fn finish_borders(&self, tiles: &[TileIndex]) -> Result<Vec<(TileIndex, Vec<TileIndex>)>> {
         let (tree, style) = (&self.partition().tree, &self.borders.joined.appearance.style);
         let finish = |&tile: &TileIndex| {
-            let work = || finish_border_normals(self.store(), tree, style, tile, &self.seam(tile)?);
-            Ok((tile, self.session.journal.step(JobStep::BorderNormals(tile), work)?))
+            interrupt::check()?;
+            Ok((tile, finish_border_normals(self.store(), tree, style, tile, &self.seam(tile)?)?))
         };
         tiles.par_iter().map(finish).collect()
     }
@@ -116,15 +116,11 @@ impl<'a> BorderSession<'a> {
             false => self.borders.of(other),
         };
         let write = |&tile: &TileIndex| {
-            let (directory, store) = (self.session.directory, self.store());
-            let work = || write_tile(directory, store, style, canvas, tile, &self.seam(tile)?, &border_of);
-            let (step, journal) = (JobStep::WriteTile(tile), &self.session.journal);
-            let stats = journal.step(step, work)?;
-            if journal.has(step) {
-                self.stage.take_over(1)
-            } else {
-                self.stage.advance(1)
-            }
+            interrupt::check()?;
+            let Folder { directory, store, journal, .. } = &self.folder;
+            let (stats, files) = write_tile(directory, store, style, canvas, tile, &self.seam(tile)?, &border_of)?;
+            journal.add_files(&files);
+            self.stage.advance(1);
             Ok(stats)
         };
         let add = |mut a: TileStats, b| {
@@ -134,22 +130,13 @@ impl<'a> BorderSession<'a> {
         tiles.par_iter().map(write).try_reduce(TileStats::default, add)
     }
 
-    /// Waits until all that was written is on the disk.
+    /// Records what is written, and ends the session. Returns the bytes that the part's store keeps.
     ///
     /// # Errors
     /// [`sys::Error::Io`].
-    pub(crate) fn make_durable(&self) -> Result<()> {
-        self.session.journal.commit()?;
-        self.store().sync()
-    }
-
-    /// Ends the session while tiles still wait. Returns what it took.
-    ///
-    /// # Errors
-    /// [`sys::Error::Io`].
-    pub(crate) fn end(self) -> Result<StageStats> {
-        self.session.end()?;
-        Ok(self.stage.finish())
+    pub(crate) fn finish(self, some: SomeTiles) -> Result<u64> {
+        self.folder.record(JobStep::Tiles, some, vec![self.stage.finish()])?;
+        Ok(self.folder.store.bytes())
     }
 }
 
@@ -158,7 +145,7 @@ const MOST_KNOWN: usize = 1000;
 
 /// Finished borders of tiles of other parts. Those that are not stored yet are computed: a part's folder has one writer.
 pub(crate) struct ForeignBorders<'a> {
-    job: &'a PartsJob<'a>,
+    job: &'a Job<'a>,
     stores: &'a PartStores,
     joined: &'a JoinedParts,
     known: Mutex<HashMap<TileIndex, FinishedBorder>>,
@@ -166,7 +153,7 @@ pub(crate) struct ForeignBorders<'a> {
 
 impl<'a> ForeignBorders<'a> {
     /// Returns the borders of a job whose parts are joined as far as `joined` tells.
-    pub(crate) fn new(job: &'a PartsJob<'a>, stores: &'a PartStores, joined: &'a JoinedParts) -> ForeignBorders<'a> {
+    pub(crate) fn new(job: &'a Job<'a>, stores: &'a PartStores, joined: &'a JoinedParts) -> ForeignBorders<'a> {
         ForeignBorders { job, stores, joined, known: Mutex::default() }
     }
 
@@ -185,9 +172,9 @@ impl<'a> ForeignBorders<'a> {
     }
 
     fn find(&self, tile: TileIndex) -> Result<FinishedBorder> {
-        let OpenPart { store, partition, borders } = &*self.stores.open(tile.part())?;
+        let OpenPart { store, partition, .. } = &*self.stores.open(tile.part())?;
         // Another machine may be writing it. But what a written tile needed may be gone, and then it is whole.
-        if borders.get(&tile).is_some_and(|record| store.is_whole(record)) {
+        if store.has_whole(StepRecord::FinishedBorder(tile))? {
             return FinishedBorder::load(store, tile);
         }
         let seam = self.joined.seam_of(self.job, store, &partition.tree, tile)?;

@@ -1,11 +1,14 @@
 //! The stores of parts that are meshed, opened when they are needed.
 
 use crate::durable::directory::JobDirectory;
-use crate::index::{PartIndex, TileIndex};
+use crate::durable::journal::records_of;
+use crate::index::PartIndex;
 use crate::partition::result::Partition;
-use crate::records::{JobStep, RecordRef, Store};
-use crate::run::part_entries::{PartHeader, entries_of, open_store, records_of};
-use std::collections::{HashMap, VecDeque};
+use crate::records::{JobStep, Store};
+use crate::run::job::Job;
+use crate::run::part_entries::{PartHeader, entries_of, open_store};
+use crate::run::phases::meshed_part::{SomeTiles, tiles_so_far};
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use sys::{Error, Result};
 
@@ -13,8 +16,8 @@ use sys::{Error, Result};
 pub(crate) struct OpenPart {
     pub(crate) store: Store,
     pub(crate) partition: Partition,
-    /// The records of finished borders.
-    pub(crate) borders: HashMap<TileIndex, RecordRef>,
+    /// What is written of its tiles.
+    pub(crate) tiles: SomeTiles,
 }
 
 /// How many parts stay open for the next who asks. Each has a few open files.
@@ -28,8 +31,8 @@ pub(crate) struct PartStores {
 }
 
 impl PartStores {
-    pub(crate) fn new(directory: &JobDirectory, job: u64) -> PartStores {
-        PartStores { directory: directory.clone(), job, open: Mutex::default() }
+    pub(crate) fn new(job: &Job) -> PartStores {
+        PartStores { directory: job.directory.clone(), job: job.id, open: Mutex::default() }
     }
 
     /// Opens the store of `part`, which must be meshed.
@@ -43,17 +46,11 @@ impl PartStores {
         }
         let directory = self.directory.part(part);
         let entries = entries_of(&directory, PartHeader { job: self.job, part })?;
-        if !entries.iter().any(|entry| entry.step == JobStep::MeshPart) {
+        if !entries.iter().any(|entry| entry.step == JobStep::Mesh) {
             return Err(Error::Broken(format!("part {part} is not meshed")));
         }
-        let records = records_of(&entries);
-        let store = open_store(&directory, &records)?;
-        let borders = entries.iter().filter_map(|entry| match entry.step {
-            JobStep::BorderNormals(tile) => Some((tile, *entry.records.first()?)),
-            _ => None,
-        });
-        let borders = borders.collect();
-        let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, store, borders });
+        let store = open_store(&directory, records_of(&entries).into_values())?;
+        let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, tiles: tiles_so_far(&entries)?, store });
         open.push_back((part, opened.clone()));
         if open.len() > KEPT_OPEN {
             open.pop_front();

@@ -8,32 +8,27 @@ use crate::partition::point_file::PointFiles;
 use crate::partition::result::Partition;
 use crate::partition::tree::{Cell, NodeKind};
 use crate::plan::budget::merge_memory;
-use crate::plan::job_plan::Plan;
 use crate::progress::activity::Activity;
 use crate::progress::stage::Stage;
-use crate::records::{JobStep, StepOutput};
-use crate::run::freeing::Freeing;
-use crate::run::postponed_merges::PostponedMerges;
-use crate::run::run_context::RunContext;
-use crate::run::stage_costs::triangulated_share;
-use crate::run::tile_queue::TileQueue;
+use crate::run::folder::Folder;
+use crate::run::job::Job;
+use crate::run::phases::postponed_merges::PostponedMerges;
+use crate::run::phases::stage_costs::triangulated_share;
+use crate::run::phases::tile_queue::TileQueue;
 use crate::tiles::dependencies::FinishedTile;
 use rayon::Scope;
-use sys::{Error, Result};
+use sys::{Error, Result, fault, interrupt};
 
 /// Walks the tree.
 pub(crate) struct TreeWalk<'a> {
-    pub(crate) run: &'a RunContext<'a>,
-    pub(crate) plan: &'a Plan,
+    pub(crate) job: &'a Job<'a>,
+    pub(crate) folder: &'a Folder<'a>,
     pub(crate) partition: &'a Partition,
-    /// The points; `None` if all leaves are done.
-    pub(crate) points: Option<PointFiles>,
+    pub(crate) points: PointFiles,
     pub(crate) stage: &'a Stage,
     pub(crate) activity: &'a Activity,
     /// Takes the tiles that are finished.
     pub(crate) queue: &'a TileQueue<'a>,
-    /// Takes the points that are not needed any more.
-    pub(crate) freeing: &'a Freeing<'a>,
     /// Takes the nodes that do not fit the memory.
     pub(crate) unmerged: PostponedMerges,
 }
@@ -57,11 +52,13 @@ impl<'a> TreeWalk<'a> {
     }
 
     fn leaf(&self, scope: &Scope<'a>, node: NodeIndex, tile: TileIndex) -> crate::Result<LeafStats> {
-        let (step, points) = (JobStep::Leaf(tile), self.partition.points(tile));
-        let triangulate = || self.activity.time(points, || self.triangulate(tile));
-        let stats: LeafStats = self.run.journal.step(step, triangulate)?;
-        self.freeing.leaf_done(tile);
-        self.run.count(self.stage, step, triangulated_share(points));
+        interrupt::check()?;
+        let Job { plan, triangulator, .. } = *self.job;
+        let (points, store) = (self.partition.points(tile), &self.folder.store);
+        let triangulate = || triangulate_leaf(plan, self.partition, &self.points, store, triangulator, tile);
+        let stats = self.activity.time(points, triangulate)?;
+        fault::point("leaf");
+        self.stage.advance(triangulated_share(points));
         // Any other leaf passes its hull up.
         if self.partition.tree.node(node).cell == Cell::PLANE || stats.sites == 0 {
             self.queue.push(scope, FinishedTile { tile, last_merge: node });
@@ -69,24 +66,18 @@ impl<'a> TreeWalk<'a> {
         Ok(stats)
     }
 
-    fn triangulate(&self, tile: TileIndex) -> crate::Result<StepOutput<LeafStats>> {
-        let RunContext { store, triangulator, .. } = *self.run;
-        let points = self.points.as_ref();
-        let points = points.ok_or_else(|| Error::Broken(format!("the points of tile {tile} are gone")))?;
-        triangulate_leaf(self.plan, self.partition, points, store, triangulator, tile)
-    }
-
     fn merge(&self, scope: &Scope<'a>, node: NodeIndex) -> crate::Result<()> {
-        let RunContext { store, journal, threads, .. } = *self.run;
+        interrupt::check()?;
+        let Job { plan, threads, .. } = *self.job;
+        let store = &self.folder.store;
         let below = self.partition.tree.merged_by(node);
         if below.iter().any(|&child| self.unmerged.sites(child).is_some()) {
             return self.leave_out(node, &below);
         }
-        let memory = merge_memory(&self.plan.options, node == NodeIndex::ROOT, threads);
+        let memory = merge_memory(&plan.options, node == NodeIndex::ROOT, threads);
         let sources: Vec<_> = below.iter().map(|&child| (store, child)).collect();
         let cell = self.partition.tree.node(node).cell;
-        let merge = || self.activity.time(0, || merge_frontiers(self.plan, cell, &sources, store, memory, node));
-        match journal.step(JobStep::Merge(node), merge) {
+        match self.activity.time(0, || merge_frontiers(plan, cell, &sources, store, memory, node)) {
             Err(crate::Error::System(Error::Memory(_))) => self.leave_out(node, &below),
             merged => {
                 for tile in merged? {
@@ -101,7 +92,7 @@ impl<'a> TreeWalk<'a> {
     fn leave_out(&self, node: NodeIndex, below: &[NodeIndex]) -> crate::Result<()> {
         let sites = |child: &NodeIndex| match self.unmerged.sites(*child) {
             Some(sites) => Ok(sites),
-            None => Frontier::count(self.run.store, *child),
+            None => Frontier::count(&self.folder.store, *child),
         };
         self.unmerged.add(node, below.iter().map(sites).sum::<Result<u64>>()?);
         Ok(())

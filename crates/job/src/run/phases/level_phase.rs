@@ -1,4 +1,4 @@
-//! Running step 7 for all coarser tiles.
+//! Step 7: the coarser tiles of a part, and those above the parts.
 
 use crate::index::PartIndex;
 use crate::levels::hierarchy::{Hierarchy, LevelSizes};
@@ -6,16 +6,38 @@ use crate::levels::make_level::{LevelContext, LevelStats, TopOf, level_memory, m
 use crate::partition::result::Partition;
 use crate::plan::job_plan::Plan;
 use crate::records::JobStep;
-use crate::run::run_context::RunContext;
+use crate::run::folder::{Folder, once};
+use crate::run::job::Job;
+use crate::run::phases::join::JoinedParts;
+use crate::run::phases::part_store::PartStores;
 use crate::tiles::style::TileStyle;
 use rayon::prelude::*;
-use sys::Result;
 use sys::threads::on_threads;
+use sys::{Error, Result, interrupt};
 
-/// The coarser tiles of a job, or of a part.
-pub(crate) struct LevelResult {
-    pub(crate) hierarchy: Hierarchy,
-    pub(crate) stats: LevelStats,
+/// Makes the coarser tiles of `part`, unless that is done. If viewers get none, because the job has no tileset, notes that.
+///
+/// # Errors
+/// Those of [`make_levels`]; [`crate::Error::InUse`] if another process has the part.
+pub(crate) fn levels_of_part(
+    job: &Job,
+    stores: &PartStores,
+    joined: &JoinedParts,
+    part: PartIndex,
+    has_tileset: bool,
+) -> crate::Result<LevelStats> {
+    let directory = &job.directory.part(part);
+    once(job, directory, part, JobStep::Levels, |folder| {
+        let open = stores.open(part)?;
+        // The store of the part grows, so what is open now must not be used again.
+        stores.close(part);
+        if !has_tileset {
+            return Ok(folder.record(JobStep::Levels, LevelStats::default(), Vec::new())?);
+        }
+        let hierarchy = hierarchy_of(job.plan, &open.partition);
+        let no_other = |other: PartIndex| Err(Error::Broken(format!("part {part} has no tile of part {other}")));
+        make_levels(job, folder, part, &hierarchy, &joined.appearance.style, &no_other)
+    })
 }
 
 /// Returns how large the coarser tiles of a job are to be.
@@ -29,29 +51,29 @@ pub(crate) fn hierarchy_of(plan: &Plan, partition: &Partition) -> Hierarchy {
     Hierarchy::new(&partition.tree, &points, level_sizes(plan))
 }
 
-/// Makes the coarser tiles of `hierarchy`, over the tree of `part`. Those of one height are made in parallel, as many at a time as the
-/// memory has room for. `top_of` returns the topmost tiles of other parts.
+/// Makes the coarser tiles of `hierarchy`, over the tree of `part`, in the folder of the part. Those of one height are made in parallel, as
+/// many at a time as the memory has room for. `top_of` returns the topmost tiles of other parts.
 ///
 /// # Errors
-/// Those of [`make_level`].
+/// Those of [`make_level`]; [`Error::Io`] on the folder.
 pub(crate) fn make_levels(
-    run: &RunContext,
-    plan: &Plan,
+    job: &Job,
+    folder: &Folder,
     part: PartIndex,
-    hierarchy: Hierarchy,
+    hierarchy: &Hierarchy,
     style: &TileStyle,
     top_of: TopOf,
-) -> Result<LevelResult> {
-    let output = &plan.options.output;
-    let sizes = level_sizes(plan);
-    let stage = run.progress.stage("levels", hierarchy.tiles.len() as u64, "tiles");
-    let (directory, store) = (run.directory, run.store);
-    let context =
-        LevelContext { directory, store, hierarchy: &hierarchy, style, sizes, meshes: output.levels, part, top_of };
+) -> crate::Result<LevelStats> {
+    let (output, sizes) = (&job.plan.options.output, level_sizes(job.plan));
+    let stage = job.progress.stage("levels", hierarchy.tiles.len() as u64, "tiles");
+    let Folder { directory, store, journal, .. } = folder;
+    let context = LevelContext { directory, store, hierarchy, style, sizes, meshes: output.levels, part, top_of };
     let make = |index: usize| {
-        let stats = run.journal.step(JobStep::Level(hierarchy.tiles[index].node), || make_level(&context, index))?;
+        interrupt::check()?;
+        let (stats, files) = make_level(&context, index)?;
+        journal.add_files(&files);
         stage.advance(1);
-        Ok(stats)
+        Ok::<_, Error>(stats)
     };
     let sum = |mut a: LevelStats, b| {
         a += b;
@@ -65,17 +87,15 @@ pub(crate) fn make_levels(
             stats += make_all(height)?;
             continue;
         }
-        // A level reads the tiles below, which must have their names.
-        run.journal.commit()?;
-        for (tiles, threads) in
-            batches(&context, height, run.threads)?.into_iter().filter(|(tiles, _)| !tiles.is_empty())
-        {
+        let batches = batches(&context, height, job.threads)?;
+        for (tiles, threads) in batches.into_iter().filter(|(tiles, _)| !tiles.is_empty()) {
             // Threads keep the memory of the largest mesh that they have made, so each batch has its own.
             stats += on_threads(threads, || make_all(tiles))?;
         }
+        // A level reads the tiles below, which must have their names.
+        journal.name_files()?;
     }
-    run.add_stage(stage.finish());
-    Ok(LevelResult { hierarchy, stats })
+    Ok(folder.record(JobStep::Levels, stats, vec![stage.finish()])?)
 }
 
 /// Divides coarser tiles into those that can be made on all `threads` at once and those that take more memory, each with the number of

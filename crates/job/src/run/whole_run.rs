@@ -1,23 +1,22 @@
-//! What the steps of a running job share.
+//! A run that does all of a job, or ends what tasks have done: what the phases for the whole job share.
 
 use crate::durable::directory::JobDirectory;
-use crate::durable::journal::JournalPosition;
+use crate::partition::parts::Parts;
 use crate::plan::fingerprint::JobIdentity;
+use crate::plan::job_plan::Plan;
 use crate::progress::clock::JobClock;
-use crate::progress::stage::{JobProgress, Stage};
+use crate::progress::stage::JobProgress;
 use crate::progress::stats::StageStats;
-use crate::records::{JobStep, Journal, Store};
-use crate::run::temporary_bytes::TemporaryBytes;
+use crate::records::Journal;
+use crate::run::job::Job;
 use delaunay_gpu::triangulator::Triangulator;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
-use sys::Result;
 
-/// A run whose directory is locked, with its store and journal.
-pub(crate) struct RunContext<'a> {
+/// A run whose directory is locked, with the journal of the job.
+pub(crate) struct WholeRun<'a> {
     pub(crate) triangulator: &'a Triangulator,
     pub(crate) directory: &'a JobDirectory,
-    pub(crate) store: &'a Store,
     pub(crate) journal: &'a Journal<'a>,
     pub(crate) progress: &'a JobProgress,
     pub(crate) threads: usize,
@@ -28,20 +27,30 @@ pub(crate) struct RunContext<'a> {
     pub(crate) identity: JobIdentity,
     /// Tells the folders of this job's parts from those of others.
     pub(crate) job_id: u64,
-    /// The number of steps that an interrupted run had finished.
+    /// The number of phases that an interrupted run had completed.
     pub(crate) resumed: u64,
-    /// Whether what is there is the work of tasks, which is not compared with its hashes.
-    pub(crate) is_by_tasks: bool,
-    /// What the temporary files take.
-    pub(crate) temporary: TemporaryBytes,
     /// The stages that have ended.
     pub(crate) stages: Mutex<Vec<StageStats>>,
 }
 
-impl RunContext<'_> {
-    /// Counts the units of `step` as done, by this run or by an earlier one.
-    pub(crate) fn count(&self, stage: &Stage, step: JobStep, amount: u64) {
-        if self.journal.has(step) { stage.take_over(amount) } else { stage.advance(amount) }
+impl<'a> WholeRun<'a> {
+    /// Returns the job, of which this run does all.
+    pub(crate) fn job<'j>(&self, plan: &'j Plan, parts: &'j Parts) -> Job<'j>
+    where
+        'a: 'j,
+    {
+        Job {
+            plan,
+            parts,
+            directory: self.directory,
+            triangulator: self.triangulator,
+            progress: self.progress,
+            threads: self.threads,
+            clock: self.clock,
+            id: self.job_id,
+            checks_points: self.resumed > 0,
+            is_task: false,
+        }
     }
 
     /// Returns the seconds since the job began. Machines may have clocks that differ, so it is no less than what this process took.
@@ -62,14 +71,5 @@ impl RunContext<'_> {
     /// Returns the stages that have ended.
     pub(crate) fn stages(&self) -> MutexGuard<'_, Vec<StageStats>> {
         self.stages.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Removes the points. At `all_leaves` the journal has all leaves: from there on the store is enough.
-    pub(crate) fn remove_points(&self, all_leaves: JournalPosition) -> Result<()> {
-        self.journal.commit_to(all_leaves)?;
-        if self.journal.is_worth_syncing() {
-            self.store.sync()?;
-        }
-        self.directory.remove_points()
     }
 }

@@ -1,12 +1,12 @@
-//! How tiles look in a job of several parts.
+//! How the tiles of a job look.
 
 use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::index::TileIndex;
-use crate::plan::job_plan::HeaderClaims;
-use crate::records::{Leaf, RecordRef, StepRecord, Store};
-use crate::run::parts::part_store::PartStores;
-use crate::run::parts::parts_job::PartsJob;
-use crate::run::tile_queue::TileAppearance;
+use crate::plan::job_plan::Claims;
+use crate::records::{Leaf, StepRecord, Store};
+use crate::run::job::Job;
+use crate::run::phases::part_store::PartStores;
+use crate::run::phases::tile_queue::TileAppearance;
 use crate::tiles::max_edge::MaxEdgeRule;
 use delaunay::geometry::Bounds;
 use rayon::prelude::*;
@@ -26,8 +26,8 @@ pub(crate) struct SitesOfParts {
 /// Returns how tiles look, unless all sites decide that.
 ///
 /// # Errors
-/// [`Error::Broken`] if the job has no claims.
-pub(crate) fn early_appearance(job: &PartsJob) -> Result<Option<Arc<TileAppearance>>> {
+/// [`Error::Broken`] if nothing is known of the points yet.
+pub(crate) fn early_appearance(job: &Job) -> Result<Option<Arc<TileAppearance>>> {
     match job.plan.options.output.max_edge {
         MaxEdge::Auto => Ok(None),
         choice => {
@@ -38,20 +38,15 @@ pub(crate) fn early_appearance(job: &PartsJob) -> Result<Option<Arc<TileAppearan
     }
 }
 
-/// Counts all sites for the rule that looks at them, if the job has it, and stores the counts. The claims would give the rule another grid
-/// than the points themselves do in a job of one part.
+/// Counts all sites for the rule that looks at them, if the job has it, and stores the counts. Its grid is that of the points themselves,
+/// whatever headers claim.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on a store.
-pub(crate) fn count_sites(
-    job: &PartsJob,
-    stores: &PartStores,
-    all: SitesOfParts,
-    store: &Store,
-) -> Result<Option<RecordRef>> {
+pub(crate) fn count_sites(job: &Job, stores: &PartStores, all: SitesOfParts, store: &Store) -> Result<()> {
     let choice = job.plan.options.output.max_edge;
     if choice != MaxEdge::Auto {
-        return Ok(None);
+        return Ok(());
     }
     let visit = |visit: &(dyn Fn(&[i32; 3]) + Sync)| {
         job.parts.all().try_for_each(|part| {
@@ -61,14 +56,14 @@ pub(crate) fn count_sites(
         })
     };
     let rule = MaxEdgeRule::new(choice, &job.plan.frame, all.sites, all.bounds, &visit)?;
-    ColumnWriter::default().push(rule.counts()).write(store, StepRecord::Spacing).map(Some)
+    ColumnWriter::default().push(rule.counts()).write(store, StepRecord::Spacing)
 }
 
 /// Returns how tiles look. If all sites decide that, `store` has their counts.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on the store.
-pub(crate) fn final_appearance(job: &PartsJob, all: SitesOfParts, store: &Store) -> Result<Arc<TileAppearance>> {
+pub(crate) fn final_appearance(job: &Job, all: SitesOfParts, store: &Store) -> Result<Arc<TileAppearance>> {
     if let Some(appearance) = early_appearance(job)? {
         return Ok(appearance);
     }
@@ -76,15 +71,15 @@ pub(crate) fn final_appearance(job: &PartsJob, all: SitesOfParts, store: &Store)
     appearance(job, MaxEdgeRule::of_counts(all.sites, all.bounds, counts)?).map(Arc::new)
 }
 
-fn appearance(job: &PartsJob, rule: MaxEdgeRule) -> Result<TileAppearance> {
-    let HeaderClaims { bounds, max_rgb } = claims(job)?;
+fn appearance(job: &Job, rule: MaxEdgeRule) -> Result<TileAppearance> {
+    let Claims { bounds, max_rgb } = claims(job)?;
     TileAppearance::new(job.plan, max_rgb, bounds, rule)
 }
 
-fn bounds(job: &PartsJob) -> Result<Bounds<3>> {
+fn bounds(job: &Job) -> Result<Bounds<3>> {
     claims(job).map(|claims| claims.bounds)
 }
 
-fn claims(job: &PartsJob) -> Result<HeaderClaims> {
-    job.plan.claims.ok_or_else(|| Error::Broken("a job of several parts has no claims".into()))
+fn claims(job: &Job) -> Result<Claims> {
+    job.plan.claims.ok_or_else(|| Error::Broken("nothing is known of the points yet".into()))
 }

@@ -1,5 +1,5 @@
-//! Merge nodes that do not fit the memory. The walk goes on without them, so that one message can name a limit that suffices for all;
-//! what is finished meanwhile is kept.
+//! Merge nodes that do not fit the memory. The walk goes on without them, so that one message can name a limit that suffices for all nodes of
+//! the part.
 
 use crate::index::NodeIndex;
 use crate::options::JobOptions;

@@ -1,0 +1,185 @@
+//! The merges above the parts.
+
+use crate::durable::directory::JobDirectory;
+use crate::durable::journal::records_of;
+use crate::index::{NodeIndex, PartIndex, TileIndex};
+use crate::merge_records::{HullCount, Seam, SeamOfTile};
+use crate::mesh::merge::merge_frontiers;
+use crate::partition::tree::{NodeKind, Tree};
+use crate::plan::budget::merge_memory;
+use crate::progress::stats::StageStats;
+use crate::records::{JobStep, StepRecord, Store};
+use crate::run::done::Done;
+use crate::run::folder::{Folder, once};
+use crate::run::job::Job;
+use crate::run::part_entries::{entries_of, open_store};
+use crate::run::phases::appearance::{SitesOfParts, count_sites, early_appearance, final_appearance};
+use crate::run::phases::part_store::{OpenPart, PartStores};
+use crate::run::phases::tile_queue::TileAppearance;
+use crate::tiles::dependencies::FinishedTile;
+use crate::tiles::seam::seam_of;
+use std::sync::Arc;
+use sys::Result;
+use tiles::options::MaxEdge;
+
+/// The merges above the parts, done.
+pub(crate) struct JoinedParts {
+    /// What they left; `None` if there was nothing to do.
+    store: Option<Store>,
+    /// How tiles look, now that all sites are known.
+    pub(crate) appearance: Arc<TileAppearance>,
+    pub(crate) stages: Vec<StageStats>,
+    /// The largest resident set of the process that merged, in bytes.
+    pub(crate) peak_memory: Option<u64>,
+}
+
+/// Tells whether there is anything to do once all parts are meshed.
+fn is_needed(job: &Job) -> bool {
+    job.parts.all().len() > 1 || job.plan.options.output.max_edge == MaxEdge::Auto
+}
+
+/// Merges what the parts send up, or what an interrupted run left of it. `all` is what the parts hold.
+///
+/// # Errors
+/// Those of [`merge_frontiers`]; [`crate::Error::InUse`] if another process does it.
+pub(crate) fn join_parts(job: &Job, stores: &PartStores, all: SitesOfParts) -> crate::Result<()> {
+    if !is_needed(job) {
+        return Ok(());
+    }
+    let directory = &job.directory.join();
+    once(job, directory, job.above(), JobStep::Join, |folder| {
+        let parts = job.parts.all().len() as u64;
+        let stage = job.progress.stage("join", parts, "parts");
+        merge_below(job, stores, folder, NodeIndex::ROOT)?;
+        count_sites(job, stores, all, &folder.store)?;
+        stage.advance(parts);
+        Ok(folder.record(JobStep::Join, all, vec![stage.finish()])?)
+    })
+    .map(|_| ())
+}
+
+/// Merges at those nodes above the parts for which only part `last` was missing: all parts before it are meshed. Returns the tiles that
+/// no merge can change from now on.
+///
+/// # Errors
+/// As [`join_parts`].
+pub(crate) fn merge_through(job: &Job, stores: &PartStores, last: PartIndex) -> crate::Result<Vec<TileIndex>> {
+    let complete = nodes_completed_by(&job.parts.tree, job.parts.node(last));
+    if complete.is_empty() {
+        return Ok(Vec::new());
+    }
+    let directory = &job.directory.join();
+    let folder = Folder::open(job, directory, job.above())?;
+    let merges = complete.into_iter().map(|node| merge_at(job, stores, &folder, node));
+    Ok(merges.collect::<crate::Result<Vec<_>>>()?.concat())
+}
+
+/// Returns the merge nodes above `leaf` that have no later leaf, children first.
+fn nodes_completed_by(tree: &Tree, leaf: NodeIndex) -> Vec<NodeIndex> {
+    let (mut complete, mut node) = (Vec::new(), leaf);
+    while let Some(parent) = tree.node(node).parent {
+        match tree.node(parent).kind {
+            NodeKind::Inner([_, high]) if high == node => node = parent,
+            _ => break,
+        }
+        complete.extend(tree.is_merge(node).then_some(node));
+    }
+    complete
+}
+
+/// Merges at all merge nodes at and below `node`, children first.
+fn merge_below(job: &Job, stores: &PartStores, folder: &Folder, node: NodeIndex) -> crate::Result<()> {
+    let tree = &job.parts.tree;
+    let NodeKind::Inner([low, high]) = tree.node(node).kind else { return Ok(()) };
+    let below = |child| merge_below(job, stores, folder, child);
+    let (low, high) = rayon::join(|| below(low), || below(high));
+    low.and(high)?;
+    if !tree.is_merge(node) {
+        return Ok(());
+    }
+    merge_at(job, stores, folder, node).map(|_| ())
+}
+
+/// Merges at `node`, unless that is done. Returns the tiles that this finishes.
+fn merge_at(job: &Job, stores: &PartStores, folder: &Folder, node: NodeIndex) -> crate::Result<Vec<TileIndex>> {
+    if let Some(finished) = folder.done(JobStep::Merge(node))? {
+        return Ok(finished);
+    }
+    let tree = &job.parts.tree;
+    let below = tree.merged_by(node);
+    let open = |child: &NodeIndex| match tree.node(*child).kind {
+        NodeKind::Leaf(tile) => stores.open(tile.part()).map(Some),
+        NodeKind::Inner(_) => Ok(None),
+    };
+    let opened: Vec<Option<Arc<OpenPart>>> = below.iter().map(open).collect::<Result<_>>()?;
+    let sources: Vec<(&Store, NodeIndex)> = below
+        .iter()
+        .zip(&opened)
+        .map(|(&child, part)| part.as_ref().map_or((&folder.store, child), |part| (&part.store, NodeIndex::ROOT)))
+        .collect();
+    let memory = merge_memory(&job.plan.options, node == NodeIndex::ROOT, job.threads);
+    let finished = merge_frontiers(job.plan, tree.node(node).cell, &sources, &folder.store, memory, node)?;
+    Ok(folder.record(JobStep::Merge(node), finished, Vec::new())?)
+}
+
+impl JoinedParts {
+    /// Opens what [`join_parts`] has left; `None` if it is not complete.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on its folder.
+    pub(crate) fn open(job: &Job) -> Result<Option<JoinedParts>> {
+        if let (false, Some(appearance)) = (is_needed(job), early_appearance(job)?) {
+            return Ok(Some(JoinedParts { store: None, appearance, stages: Vec::new(), peak_memory: None }));
+        }
+        let directory = job.directory.join();
+        let entries = entries_of(&directory, job.header(job.above()))?;
+        let Some(entry) = entries.iter().find(|entry| entry.step == JobStep::Join) else { return Ok(None) };
+        let Done { figures: all, stages, peak_memory, .. } = entry.figures::<Done<SitesOfParts>>()?;
+        let store = open_store(&directory, records_of(&entries).into_values())?;
+        let appearance = final_appearance(job, all, &store)?;
+        Ok(Some(JoinedParts { store: Some(store), appearance, stages, peak_memory }))
+    }
+
+    /// Returns what is merged while parts are still to come.
+    ///
+    /// # Errors
+    /// As [`JoinedParts::open`].
+    pub(crate) fn so_far(job: &Job, appearance: Arc<TileAppearance>) -> Result<JoinedParts> {
+        let directory: JobDirectory = job.directory.join();
+        let store = match is_needed(job) {
+            true => {
+                let entries = entries_of(&directory, job.header(job.above()))?;
+                Some(open_store(&directory, records_of(&entries).into_values())?)
+            }
+            false => None,
+        };
+        Ok(JoinedParts { store, appearance, stages: Vec::new(), peak_memory: None })
+    }
+
+    /// Returns what all seams have of `tile` of the part with `store` and `tree`.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a store.
+    pub(crate) fn seam_of(&self, job: &Job, store: &Store, tree: &Tree, tile: TileIndex) -> Result<SeamOfTile> {
+        let mut seam = seam_of(store, tree, FinishedTile { tile, last_merge: NodeIndex::ROOT })?;
+        let Some(joined) = &self.store else { return Ok(seam) };
+        let above = job.parts.tree.merges_above(job.parts.node(tile.part()));
+        // A tile that is finished before all parts are merged has no seam above.
+        for node in above.take_while(|node| joined.has(StepRecord::Seam(*node))) {
+            seam.add(Seam::touching(joined, node, tile)?);
+        }
+        Ok(seam)
+    }
+
+    /// Returns how many slivers along the hull the whole mesh has.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a store.
+    pub(crate) fn hull_count(&self, job: &Job, stores: &PartStores) -> Result<HullCount> {
+        match (&self.store, &job.parts.tree.node(NodeIndex::ROOT).kind) {
+            (Some(store), NodeKind::Inner(_)) => Seam::hull_count(store, NodeIndex::ROOT),
+            // The root of its tree is that of all.
+            _ => Seam::hull_count(&stores.open(PartIndex::FIRST)?.store, NodeIndex::ROOT),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Steps 3 to 6 of a part whose points have all been read: leaves and merges, and the tiles that need no other part, each as soon as it is
+//! finished.
+
+use crate::Result;
+use crate::index::{NodeIndex, PartIndex, TileIndex};
+use crate::mesh::leaf::LeafStats;
+use crate::partition::point_file::PointFiles;
+use crate::partition::result::Partition;
+use crate::progress::stats::StageStats;
+use crate::records::{JobStep, NewEntry, RecordChanges, StepRecord, Store};
+use crate::run::folder::{Folder, once};
+use crate::run::job::Job;
+use crate::run::phases::meshed_part::{MeshedPart, SomeTiles};
+use crate::run::phases::postponed_merges::PostponedMerges;
+use crate::run::phases::read_phase::points_of;
+use crate::run::phases::tile_queue::{TileAppearance, TileQueue};
+use crate::run::phases::tree_walk::TreeWalk;
+use std::collections::HashSet;
+use std::sync::Arc;
+
+/// Meshes a part whose points have all been read, unless that is done. With an `appearance` its finished tiles are written meanwhile.
+/// Temporary files of other parts take `others` bytes; `None` where nothing tells.
+///
+/// # Errors
+/// Those of the steps; [`crate::Error::DamagedSteps`] if the points are damaged; [`crate::Error::InUse`] if another process has the part.
+pub(crate) fn mesh_one(
+    job: &Job,
+    part: PartIndex,
+    appearance: Option<&Arc<TileAppearance>>,
+    others: Option<u64>,
+) -> Result<MeshedPart> {
+    let directory = &job.directory.part(part);
+    let meshed = once(job, directory, part, JobStep::Mesh, |folder| mesh(job, folder, part, appearance, others))?;
+    directory.remove_points()?;
+    Ok(meshed)
+}
+
+fn mesh(
+    job: &Job,
+    folder: &Folder,
+    part: PartIndex,
+    appearance: Option<&Arc<TileAppearance>>,
+    others: Option<u64>,
+) -> Result<MeshedPart> {
+    let partition = points_of(job, part)?.partition(folder.directory)?;
+    partition.save(&folder.store)?;
+    let MeshInTiles { leaves, tiles, open, stages } = mesh_in_tiles(job, folder, &partition, appearance)?;
+    let is_kept = job.plan.keeps_mesh();
+    if !is_kept {
+        free_inner_records(&folder.store, &partition, &tiles.written)?;
+    }
+    let meshed = MeshedPart {
+        points: partition.kept,
+        leaves,
+        tiles: partition.blocks.len(),
+        open,
+        is_kept,
+        temporary: partition.point_bytes + folder.store.peak() + others.unwrap_or(0),
+        by_task: job.is_task,
+        stored: folder.store.bytes(),
+    };
+    let meshed = folder.done_now(meshed, stages);
+    let [of_mesh, of_tiles] = by_style(folder.store.take_changes());
+    // Another style needs the mesh, but not the tiles.
+    let mut entries = vec![NewEntry::new(JobStep::Mesh, &meshed, of_mesh)?];
+    if appearance.is_some() {
+        entries.push(NewEntry::new(JobStep::Tiles, &folder.done_now(tiles, Vec::new()), of_tiles)?);
+    }
+    folder.record_all(entries)?;
+    Ok(meshed.figures)
+}
+
+/// Parts the records that hold for any style from those of tiles that are written.
+fn by_style(changes: RecordChanges) -> [RecordChanges; 2] {
+    let is_of_tile = |key| matches!(key, StepRecord::FinishedBorder(_) | StepRecord::Pixels(_) | StepRecord::Tile(_));
+    let RecordChanges { written, dropped } = changes;
+    let (of_tiles, of_mesh) = written.into_iter().partition(|record| is_of_tile(record.key()));
+    [RecordChanges { written: of_mesh, dropped }, RecordChanges { written: of_tiles, dropped: Vec::new() }]
+}
+
+/// The mesh of a part, written as tiles as far as it is finished.
+struct MeshInTiles {
+    leaves: LeafStats,
+    tiles: SomeTiles,
+    /// The tiles that merges above the part may change.
+    open: Vec<TileIndex>,
+    stages: Vec<StageStats>,
+}
+
+/// Triangulates all leaves of a part, merges their frontiers, and writes the tiles that are finished.
+fn mesh_in_tiles(
+    job: &Job,
+    folder: &Folder,
+    partition: &Partition,
+    appearance: Option<&Arc<TileAppearance>>,
+) -> Result<MeshInTiles> {
+    let stage = job.progress.stage("mesh", partition.kept, "points");
+    let activity = job.progress.activity("triangulate", "points");
+    let queue = TileQueue::new(job, folder, partition, &stage, appearance.cloned());
+    let points = PointFiles::open(&folder.directory.point_files()?)?;
+    let unmerged = PostponedMerges::default();
+    let walk = TreeWalk { job, folder, partition, points, stage: &stage, activity: &activity, queue: &queue, unmerged };
+    let leaves = rayon::scope(|scope| {
+        let leaves = walk.walk(scope, NodeIndex::ROOT);
+        queue.attempt(|| walk.unmerged.check(&job.plan.options));
+        leaves
+    });
+    // This closes the point files: an open file is not freed when it is removed.
+    drop(walk);
+    let mut stages = vec![activity.finish()];
+    let (tiles, open) = queue.finish(&mut stages)?;
+    stage.finish();
+    Ok(MeshInTiles { leaves: leaves.unwrap_or_default(), tiles, open, stages })
+}
+
+/// Gives back what no phase needs any more once a part is meshed: all but the frontier of the part, and what the tiles need that are not
+/// `written`.
+fn free_inner_records(store: &Store, partition: &Partition, written: &[TileIndex]) -> sys::Result<()> {
+    let tree = &partition.tree;
+    let written: HashSet<TileIndex> = written.iter().copied().collect();
+    let waiting = tree.tiles().filter(|tile| !written.contains(tile));
+    let needed: HashSet<NodeIndex> = waiting.flat_map(|tile| tree.merges_above(tree.leaf(tile))).collect();
+    for node in (1..tree.nodes.len()).map(NodeIndex::new).filter(|&node| tree.is_merge(node)) {
+        store.free(StepRecord::Frontier(node))?;
+        if !needed.contains(&node) {
+            store.free(StepRecord::Seam(node))?;
+        }
+    }
+    Ok(())
+}

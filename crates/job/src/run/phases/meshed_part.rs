@@ -1,0 +1,59 @@
+//! What is known of a part once it is meshed, and of its tiles.
+
+use crate::index::TileIndex;
+use crate::mesh::leaf::LeafStats;
+use crate::records::{JobStep, JournalEntry};
+use crate::run::done::Done;
+use crate::tiles::write_tile::TileStats;
+use serde::{Deserialize, Serialize};
+use sys::Result;
+
+/// What is known of a part once it is meshed.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct MeshedPart {
+    /// Points before duplicates are dropped.
+    pub(crate) points: u64,
+    pub(crate) leaves: LeafStats,
+    /// How many tiles it has.
+    pub(crate) tiles: usize,
+    /// The tiles that merges above the part may change.
+    pub(crate) open: Vec<TileIndex>,
+    /// Whether all that other tiles than written ones need is still there, too.
+    pub(crate) is_kept: bool,
+    /// The most bytes of temporary files while it was meshed: its own, the points of later parts, and what earlier parts keep.
+    pub(crate) temporary: u64,
+    /// Whether a task meshed it, which knows nothing of other parts' files.
+    pub(crate) by_task: bool,
+    /// Bytes that its store keeps.
+    pub(crate) stored: u64,
+}
+
+/// Tiles of a part that were written at one time.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct SomeTiles {
+    pub(crate) stats: TileStats,
+    pub(crate) written: Vec<TileIndex>,
+    /// Tiles whose borders are finished, each with the tiles that must be finished before it can be written.
+    pub(crate) with_border: Vec<(TileIndex, Vec<TileIndex>)>,
+}
+
+impl SomeTiles {
+    /// Adds tiles that were written later.
+    pub(crate) fn add(&mut self, later: SomeTiles) {
+        self.stats += later.stats;
+        self.written.extend(later.written);
+        self.with_border.extend(later.with_border);
+    }
+}
+
+/// Returns what is written of the tiles of a part, as its `entries` tell.
+///
+/// # Errors
+/// [`sys::Error::Broken`] if they are not understood.
+pub(crate) fn tiles_so_far(entries: &[JournalEntry]) -> Result<SomeTiles> {
+    let mut all = SomeTiles::default();
+    for entry in entries.iter().filter(|entry| entry.step == JobStep::Tiles) {
+        all.add(entry.figures::<Done<SomeTiles>>()?.figures);
+    }
+    Ok(all)
+}

@@ -1,0 +1,96 @@
+//! The phases of a job: a process that does all of it walks through them, one part after the other, with all threads inside
+//! ([`do_phases`]); tasks of a cluster take their share of each.
+//!
+//! A part is meshed as soon as all inputs that reach it have been read, and its points go then. Tiles that touch other parts wait for
+//! the nodes above the parts. Every part has a folder, a journal and a store of its own.
+
+pub(crate) mod appearance;
+pub(crate) mod join;
+pub(crate) mod level_phase;
+pub(crate) mod mesh_phase;
+pub(crate) mod meshed_part;
+pub(crate) mod part_progress;
+pub(crate) mod part_store;
+pub(crate) mod plan_phase;
+mod postponed_merges;
+pub(crate) mod publish_phase;
+pub(crate) mod read_phase;
+pub(crate) mod stage_costs;
+pub(crate) mod tile_phase;
+mod tile_queue;
+mod tree_walk;
+mod waiting_tiles;
+
+use crate::Result;
+use crate::partition::part_points::ReadInputs;
+use crate::partition::parts::Parts;
+use crate::plan::job_plan::Plan;
+use crate::report::job_report::Report;
+use crate::run::job::Job;
+use crate::run::phases::appearance::{SitesOfParts, early_appearance};
+use crate::run::phases::join::{JoinedParts, join_parts};
+use crate::run::phases::level_phase::levels_of_part;
+use crate::run::phases::mesh_phase::mesh_one;
+use crate::run::phases::meshed_part::MeshedPart;
+use crate::run::phases::part_store::PartStores;
+use crate::run::phases::plan_phase::settled;
+use crate::run::phases::publish_phase::{publish_job, wants_tileset};
+use crate::run::phases::read_phase::{read_for, sum_up};
+use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
+use crate::run::phases::waiting_tiles::WaitingTiles;
+use crate::run::whole_run::WholeRun;
+use crate::tiles::write_tile::TileStats;
+
+/// Does all phases that an interrupted run has left.
+///
+/// # Errors
+/// Those of the phases; [`crate::Error::OtherThanClaimed`] if what is read contradicts the plan; [`crate::Error::DamagedSteps`] if what an
+/// interrupted run left proves damaged.
+pub(crate) fn do_phases(run: &WholeRun, plan: Plan) -> Result<Report> {
+    // Step 1, and step 2 where one part reads all.
+    let plan = &settled(run, plan)?;
+    let parts = &Parts::of(plan);
+    let job = &run.job(plan, parts);
+    // Steps 2 to 6 for each part, as far as it needs no later one.
+    let stores = &PartStores::new(job);
+    let all = read_and_mesh(job, stores)?;
+    // Step 4 for the nodes above the parts.
+    join_parts(job, stores, all)?;
+    let joined = JoinedParts::open(job)?.ok_or_else(|| sys::Error::Broken("the parts are not joined".into()))?;
+    // Steps 5 and 6 for the tiles that have waited.
+    let borders = &ForeignBorders::new(job, stores, &joined);
+    let mut tiles = TileStats::default();
+    for part in parts.all() {
+        tiles += finish_part(borders, part)?;
+    }
+    // Step 7 for each part.
+    let has_tileset = wants_tileset(plan, &tiles);
+    parts.all().try_for_each(|part| levels_of_part(job, stores, &joined, part, has_tileset).map(|_| ()))?;
+    // Step 7 above the parts, and step 8.
+    publish_job(run, job, stores, &joined)
+}
+
+/// Reads and meshes all parts, or those that an interrupted run left. Returns what all of them hold.
+fn read_and_mesh(job: &Job, stores: &PartStores) -> Result<SitesOfParts> {
+    let appearance = early_appearance(job)?;
+    let mut front = appearance.clone().map(|appearance| WaitingTiles::new(job, stores, appearance));
+    let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
+    // Bytes of points that wait, by part.
+    let mut waiting = vec![0; job.parts.all().len()];
+    for part in job.parts.all() {
+        let malformed = read.iter().map(|inputs| inputs.summary.counts.malformed).sum();
+        let inputs = read_for(job, part, malformed)?;
+        inputs.by_part.iter().for_each(|found| waiting[found.part.get()] += found.bytes);
+        read.push(inputs);
+        let stored = match &front {
+            Some(front) => front.stored(),
+            None => meshed.iter().map(|part| part.stored).sum::<u64>(),
+        };
+        let others = waiting[part.get() + 1..].iter().sum::<u64>() + stored;
+        let done = mesh_one(job, part, appearance.as_ref(), Some(others))?;
+        front.as_mut().map(|front| front.pass(part, &done)).transpose()?;
+        meshed.push(done);
+    }
+    let (_, bounds) = sum_up(job, read.iter())?;
+    Ok(SitesOfParts { sites: meshed.iter().map(|part| part.leaves.sites).sum(), bounds })
+}

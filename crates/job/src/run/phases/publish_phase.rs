@@ -1,0 +1,415 @@
+//! Step 8: the coarser tiles above the parts, what is beside the tiles, and the report.
+
+use crate::durable::atomic_file::{PendingFile, write_pending};
+use crate::durable::journal::PublishedFile;
+use crate::index::{PartIndex, TileIndex};
+use crate::levels::hierarchy::Hierarchy;
+use crate::levels::make_level::{Child, LevelStats};
+use crate::merge_records::HullCount;
+use crate::mesh::leaf::LeafStats;
+use crate::plan::job_plan::Plan;
+use crate::plan::no_points::no_triangle;
+use crate::progress::number_text::grouped;
+use crate::publish::flat_tile::FlatScene;
+use crate::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
+use crate::publish::placement::{heights_warning, place, placement_warning};
+use crate::publish::raster::write_raster::{RasterStats, RasterWork};
+use crate::publish::side_files::{EachTile, SideFiles, StoredTiles, write_side_files};
+use crate::publish::tileset_tree::TilesOfTree;
+use crate::records::{JobStep, Store};
+use crate::report::job_report::{Report, ReportParts, SlowestPart};
+use crate::run::done::Done;
+use crate::run::folder::Folder;
+use crate::run::job::Job;
+use crate::run::part_entries::PartJournals;
+use crate::run::phases::join::JoinedParts;
+use crate::run::phases::level_phase::{hierarchy_of, left_out_warning, level_sizes, make_levels};
+use crate::run::phases::part_progress::PartProgress;
+use crate::run::phases::part_store::PartStores;
+use crate::run::phases::read_phase::sum_up;
+use crate::run::phases::tile_queue::TileAppearance;
+use crate::run::whole_run::WholeRun;
+use crate::tiles::style::TileStyle;
+use crate::tiles::write_tile::TileStats;
+use crs::geoid::Geoid;
+use delaunay::geometry::Bounds;
+use points::PointCounts;
+use serde::de::IgnoredAny;
+use std::path::Path;
+use sys::{Error, Result, Warnings};
+use tiles::checksums::list_text;
+use tiles::color::Coloring;
+use tiles::frame::Frame;
+use tiles::options::{Hull, OutputFormat};
+use tiles::tiles3d::division::divide;
+use tiles::tiles3d::georeference::Georeference;
+use tiles::tiles3d::globe::NotPlaced;
+use tiles::tiles3d::tileset::TilesetNode;
+
+/// Makes the coarser tiles above the parts, writes what is beside the tiles, and the report.
+///
+/// # Errors
+/// Those of the steps.
+pub(crate) fn publish_job(
+    run: &WholeRun,
+    job: &Job,
+    stores: &PartStores,
+    joined: &JoinedParts,
+) -> crate::Result<Report> {
+    let parts = job.parts.all().map(|part| PartProgress::of(&job.directory.part(part), job.header(part)));
+    let parts = parts.collect::<Result<Vec<PartProgress>>>()?;
+    let mut figures = PartFigures::of(&parts)?;
+    // Most tiles may have been written after the last part was meshed.
+    let stored = job.parts.all().map(|part| Ok(stores.open(part)?.store.bytes())).sum::<Result<u64>>()?;
+    figures.temporary = figures.temporary.max(stored);
+    some_triangles(&figures.tiles, job.plan)?;
+    let (summary, bounds) = sum_up(job, parts.iter().filter_map(|part| part.read.as_ref()))?;
+    add_stages(run, joined, &parts);
+    let tileset = wants_tileset(job.plan, &figures.tiles).then(|| levels_and_root(run, job, stores, joined, &figures));
+    let (tiles, hull) = (&TilesOfParts { job, stores }, joined.hull_count(job, stores)?);
+    let written = WrittenFiles { stats: figures.tiles, hull, tiles };
+    let published = publish(run, job.plan, bounds, &written, &joined.appearance, tileset.transpose()?)?;
+    let peak_memory = parts.iter().map(PartProgress::peak_memory).max().flatten().max(joined.peak_memory);
+    let costs = CostsOfParts {
+        slowest: (parts.len() > 1).then(|| slowest(&parts)).flatten(),
+        peak_memory: peak_memory.filter(|_| figures.by_tasks || parts.len() > 1),
+        cpu_s: if figures.by_tasks { processor_seconds(&parts) } else { 0.0 },
+    };
+    Ok(write_report(run, job, summary.counts, figures, costs, published)?)
+}
+
+/// What the phases of parts took.
+struct CostsOfParts {
+    slowest: Option<SlowestPart>,
+    /// The largest resident set of the processes that did them, in bytes.
+    peak_memory: Option<u64>,
+    /// Seconds of processor time, if tasks did them.
+    cpu_s: f64,
+}
+
+/// What all parts hold together.
+struct PartFigures {
+    leaves: LeafStats,
+    tiles: TileStats,
+    levels: LevelStats,
+    /// The points of each part.
+    points: Vec<u64>,
+    temporary: u64,
+    /// Whether tasks meshed the parts.
+    by_tasks: bool,
+}
+
+impl PartFigures {
+    fn of(parts: &[PartProgress]) -> Result<PartFigures> {
+        fn figures<T>(part: usize, done: &Option<T>) -> Result<&T> {
+            done.as_ref().ok_or_else(|| Error::Broken(format!("part {part} is not complete")))
+        }
+        let (mut leaves, mut tiles, mut levels) = (LeafStats::default(), TileStats::default(), LevelStats::default());
+        let mut meshed = Vec::with_capacity(parts.len());
+        for (part, progress) in parts.iter().enumerate() {
+            let mesh = figures(part, &progress.mesh)?;
+            leaves += mesh.leaves;
+            tiles += progress.tiles.stats;
+            levels += *figures(part, &progress.levels)?;
+            meshed.push(mesh);
+        }
+        let temporary = meshed.iter().map(|mesh| mesh.temporary);
+        // All tasks together may have had as much at the same time.
+        let by_tasks = meshed.iter().any(|mesh| mesh.by_task);
+        let temporary = if by_tasks { temporary.sum() } else { temporary.max().unwrap_or(0) };
+        let points = meshed.iter().map(|mesh| mesh.points).collect();
+        Ok(PartFigures { leaves, tiles, levels, points, temporary, by_tasks })
+    }
+}
+
+/// Adds the stages of all parts to the report, in the order of the phases.
+fn add_stages(run: &WholeRun, joined: &JoinedParts, parts: &[PartProgress]) {
+    let of = |step| parts.iter().flat_map(move |part| part.stages_of(step)).cloned();
+    let first = of(JobStep::Read).chain(of(JobStep::Mesh)).chain(joined.stages.iter().cloned());
+    first.chain(of(JobStep::Tiles)).chain(of(JobStep::Levels)).for_each(|stage| run.add_stage(stage));
+}
+
+/// Returns the seconds of processor time of all phases of parts. The stages of meshing are kinds of work that go on at the same time.
+fn processor_seconds(parts: &[PartProgress]) -> f64 {
+    let steps = [JobStep::Read, JobStep::Mesh, JobStep::Tiles, JobStep::Levels];
+    let stages =
+        |part: &PartProgress| steps.iter().flat_map(|&step| part.stages_of(step)).map(|stage| stage.cpu_s).sum::<f64>();
+    parts.iter().map(stages).sum()
+}
+
+fn slowest(parts: &[PartProgress]) -> Option<SlowestPart> {
+    let (part, slowest) = parts.iter().enumerate().max_by(|(_, a), (_, b)| a.seconds().total_cmp(&b.seconds()))?;
+    let points = slowest.mesh.as_ref()?.points;
+    Some(SlowestPart { part: part as u64, seconds: slowest.seconds(), points })
+}
+
+/// Makes the coarser tiles above the parts, and returns the root of all.
+fn levels_and_root(
+    run: &WholeRun,
+    job: &Job,
+    stores: &PartStores,
+    joined: &JoinedParts,
+    figures: &PartFigures,
+) -> crate::Result<TilesetContent> {
+    let (tree, mut levels) = (&job.parts.tree, figures.levels);
+    let hierarchy = Hierarchy::above_parts(tree, &figures.points, level_sizes(job.plan));
+    let root = if hierarchy.tiles.is_empty() {
+        root_of_part(job, stores, PartIndex::FIRST)?
+    } else {
+        let directory = &job.directory.join();
+        let folder = Folder::open(job, directory, job.above())?;
+        let top_of = |part: PartIndex| {
+            let open = stores.open(part)?;
+            Child::top(job.directory, &open.store, &open.partition.tree)
+        };
+        levels += match folder.done(JobStep::Levels)? {
+            Some(done) => done,
+            None => make_levels(job, &folder, tree.part, &hierarchy, &joined.appearance.style, &top_of)?,
+        };
+        let done = folder.journal.figures_of::<Done<IgnoredAny>>(JobStep::Levels)?;
+        done.into_iter().flat_map(|done| done.stages).for_each(|stage| run.add_stage(stage));
+        let part_root = &|part: PartIndex| root_of_part(job, stores, part);
+        TilesOfTree { store: &folder.store, tree, hierarchy: &hierarchy, part_root }.root()?
+    };
+    let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
+    Ok(TilesetContent { root, levels })
+}
+
+fn root_of_part(job: &Job, stores: &PartStores, part: PartIndex) -> Result<Option<TilesetNode>> {
+    let open = stores.open(part)?;
+    let hierarchy = &hierarchy_of(job.plan, &open.partition);
+    let (store, tree) = (&open.store, &open.partition.tree);
+    TilesOfTree { store, tree, hierarchy, part_root: &|_| Ok(None) }.root()
+}
+
+/// The tiles of all parts.
+struct TilesOfParts<'a> {
+    job: &'a Job<'a>,
+    stores: &'a PartStores,
+}
+
+impl EachTile for TilesOfParts<'_> {
+    fn visit(&self, visit: &mut dyn FnMut(&Store, TileIndex) -> Result<()>) -> Result<()> {
+        self.job.parts.all().try_for_each(|part| {
+            let open = self.stores.open(part)?;
+            StoredTiles { store: &open.store, tree: &open.partition.tree }.visit(visit)
+        })
+    }
+}
+
+/// Tells whether viewers get 3D Tiles: where the user wants them, or where one file would be too large.
+pub(crate) fn wants_tileset(plan: &Plan, written: &TileStats) -> bool {
+    plan.options.output.format != OutputFormat::Glb || !fits_one_file(written)
+}
+
+/// The tiles that are written.
+struct WrittenFiles<'a> {
+    stats: TileStats,
+    /// How many slivers along the hull the whole mesh has.
+    hull: HullCount,
+    tiles: &'a dyn EachTile,
+}
+
+/// What viewers of 3D Tiles get.
+struct TilesetContent {
+    root: TilesetNode,
+    levels: LevelStats,
+}
+
+/// Checks that there is a terrain to look at.
+fn some_triangles(written: &TileStats, plan: &Plan) -> crate::Result<()> {
+    if written.triangles > 0 {
+        return Ok(());
+    }
+    if written.cut_triangles > 0 {
+        let slivers = match written.slivers {
+            0 => String::new(),
+            slivers => format!(" besides {slivers} slivers along the hull"),
+        };
+        // The rule for the hull never leaves out more than half of the mesh.
+        let by_length = written.cut_triangles - written.slivers;
+        return Err(Error::Config(format!(
+            "[output] max_edge leaves out all {by_length} triangles{slivers}: give a greater one"
+        ))
+        .into());
+    }
+    Err(no_triangle(plan))
+}
+
+/// What step 8 gives back.
+struct Published {
+    /// Bytes of the results besides the tiles.
+    bytes: u64,
+    levels: LevelStats,
+    raster: Option<RasterStats>,
+    warnings: Warnings,
+}
+
+/// Returns how the tiles of a scene that is bent become flat.
+fn flat_scene<'a>(plan: &Plan, style: &'a TileStyle, bounds: Bounds<3>) -> Option<FlatScene<'a>> {
+    let (flat, compression) = (style.flat_frame(plan, bounds), style.compression);
+    plan.curvature.is_some().then_some(FlatScene { bent: &style.frame, flat, compression })
+}
+
+/// Says that the slivers along the hull stay although the user wants them left out.
+fn hull_warning(plan: &Plan, hull: HullCount) -> Option<String> {
+    let HullCount { slivers, triangles } = hull;
+    (plan.options.output.hull == Hull::Trimmed && hull.is_most()).then(|| {
+        format!(
+            "nothing is left out along the hull: {} of {} triangles are slivers there; the points lie along a curve, or are few; \
+             [output] hull = \"whole\" says the same without this warning",
+            grouped(slivers),
+            grouped(triangles)
+        )
+    })
+}
+
+/// Writes what is beside the tiles. `levels` is there if viewers get 3D Tiles.
+///
+/// # Errors
+/// Those of the functions in [`crate::publish`].
+fn publish(
+    run: &WholeRun,
+    plan: &Plan,
+    bounds: Bounds<3>,
+    written: &WrittenFiles,
+    appearance: &TileAppearance,
+    tileset: Option<TilesetContent>,
+) -> Result<Published> {
+    let raster = write_raster(run, plan, &appearance.style.frame, written.tiles)?;
+    let stage = run.progress.stage("publish", 1, "job");
+    let output = &plan.options.output;
+    let (mut warnings, mut text, mut placement, mut stats) = (Warnings::default(), None, None, LevelStats::default());
+    if let Some(TilesetContent { mut root, levels }) = tileset {
+        let geoid = Geoid::open(output.height_offset.as_ref())?;
+        let placed = match place(&plan.crs, &appearance.style.frame, geoid, &mut root) {
+            Err(NotPlaced::Height(error)) => return Err(error),
+            placed => placed,
+        };
+        warnings.extend(placement_warning(&placed));
+        if placed.is_ok() {
+            warnings.extend(heights_warning(&plan.crs, output.height_offset.as_ref()));
+        }
+        warnings.extend(left_out_warning(plan, &levels));
+        divide(&mut root);
+        text = Some((&appearance.style.frame, root));
+        (placement, stats) = (placed.ok(), levels);
+    }
+    warnings.extend(hull_warning(plan, written.hull));
+    let raster = raster.map(|raster| {
+        warnings.extend(raster.warnings);
+        raster.stats
+    });
+    let georeference =
+        Georeference::new(&appearance.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.undisputed_code());
+    let tiles = &written.stats;
+    let fits = fits_one_file(tiles);
+    let page_of_others = output.page && run.directory.has_page_of_others()?;
+    if page_of_others {
+        let page = run.directory.results().page();
+        warnings.push(format!("the page is not written: {} came during the job, and no job wrote it", page.display()));
+    }
+    let lines = plan.built_breaklines()?;
+    let content = SideFiles {
+        georeference: georeference.to_json(placement.as_ref())?,
+        tileset: text,
+        one_file: fits && output.format != OutputFormat::Tiles3d,
+        flat: flat_scene(plan, &appearance.style, bounds),
+        page: output.page && !page_of_others,
+        copyright: output.copyright(),
+        has_ramp: matches!(appearance.style.coloring, None | Some(Coloring::Elevation(_))),
+        breaklines: lines.as_deref().map(|lines| (lines, &plan.lattice)),
+    };
+    let write = || write_side_files(run.directory, &content, &appearance.canvas, written.tiles);
+    let bytes = run.journal.step(JobStep::Publish, write)?;
+    if !fits && output.format == OutputFormat::Glb {
+        warnings.push(too_large_for_one_file(tiles));
+    }
+    stage.advance(1);
+    run.add_stage(stage.finish());
+    let bytes = bytes + raster.map_or(0, |raster| raster.bytes);
+    Ok(Published { bytes, levels: stats, raster, warnings })
+}
+
+/// The raster of a job.
+struct WrittenRaster {
+    stats: RasterStats,
+    /// What the user should know of it.
+    warnings: Vec<String>,
+}
+
+/// Writes the raster, if the user wants one. The scene of the tiles is that of `frame`.
+///
+/// # Errors
+/// Those of [`RasterWork`].
+fn write_raster(run: &WholeRun, plan: &Plan, frame: &Frame, tiles: &dyn EachTile) -> Result<Option<WrittenRaster>> {
+    let Some(work) = RasterWork::of(plan, frame, tiles)? else { return Ok(None) };
+    let stage = run.progress.stage("raster", work.blocks(), "blocks");
+    let stats = run.journal.step(JobStep::Raster, || work.write(run.directory, &|| stage.advance(1)))?;
+    run.add_stage(stage.finish());
+    Ok(Some(WrittenRaster { warnings: work.warnings(run.directory, &stats)?, stats }))
+}
+
+/// Writes the report, which completes the job.
+///
+/// # Errors
+/// [`sys::Error::Io`] if it cannot be written.
+fn write_report(
+    run: &WholeRun,
+    job: &Job,
+    points: PointCounts,
+    figures: PartFigures,
+    costs: CostsOfParts,
+    published: Published,
+) -> Result<Report> {
+    let list = write_file_list(run)?;
+    let parts = ReportParts {
+        parts: job.parts.all().len() as u64,
+        slowest_part: costs.slowest,
+        peak_memory: costs.peak_memory,
+        wall_s: run.wall_s(),
+        cpu_s_of_tasks: costs.cpu_s,
+        points,
+        leaves: figures.leaves,
+        gpu: run.triangulator.gpu().map(str::to_owned),
+        gpu_figures: run.triangulator.gpu_figures(),
+        gpu_steps: run.triangulator.gpu_steps(),
+        tiles: figures.tiles,
+        levels: published.levels,
+        raster: published.raster,
+        warnings: published.warnings,
+        other_bytes: published.bytes + list.bytes,
+        temporary: figures.temporary,
+        stages: std::mem::take(&mut *run.stages()),
+        threads: run.threads,
+        memory: job.plan.options.limits.memory.0,
+        resumed: run.resumed,
+        clock: run.clock,
+        identity: run.identity.clone(),
+        file_list: list.checksum,
+    };
+    let (report, text) = Report::new(job.plan, parts).sealed()?;
+    // The report comes last: it says that all results are there.
+    run.journal.step(JobStep::Report, || {
+        let report = write_pending(&run.directory.output().report(), &text)?;
+        Ok::<_, Error>(((), vec![list, report]))
+    })?;
+    Ok(report)
+}
+
+/// Writes the list of all results so far.
+fn write_file_list(run: &WholeRun) -> Result<PendingFile> {
+    let (directory, output) = (run.directory, run.directory.output());
+    let of_parts = PartJournals::of(directory, run.job_id)?;
+    let mut files: Vec<PublishedFile> = run.journal.files().into_iter().chain(of_parts.files().cloned()).collect();
+    files.retain(|file| directory.is_result(&file.name));
+    files.sort_by(|a, b| a.name.cmp(&b.name));
+    let files: Vec<_> = files.into_iter().map(|file| (slashed(&file.name), file.checksum)).collect();
+    write_pending(&output.checksums(), list_text(&files).as_bytes())
+}
+
+/// Returns a path with slashes on every system.
+fn slashed(path: &Path) -> String {
+    let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
+    parts.join("/")
+}

@@ -1,0 +1,74 @@
+//! Reading the inputs, each by the first part that needs it.
+
+use crate::durable::journal::records_of;
+use crate::index::PartIndex;
+use crate::mesh::precision_limit::PrecisionLimit;
+use crate::partition::part_points::{PointsOfPart, ReadInputs, check_malformed, read_inputs};
+use crate::partition::result::PointSummary;
+use crate::plan::area_hint::stretch_of_read;
+use crate::plan::no_points::no_point_is_left;
+use crate::records::JobStep;
+use crate::run::done::Done;
+use crate::run::folder::once;
+use crate::run::job::Job;
+use crate::run::part_entries::{entries_of, open_store};
+use crate::{Error, Result};
+use delaunay::geometry::Bounds;
+
+/// Reads the inputs that `reader` is the first to need, unless that is done. Inputs before them had `malformed` records.
+///
+/// # Errors
+/// Those of [`read_inputs`]; [`Error::InUse`] if another process has the folder.
+pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<ReadInputs> {
+    let Job { plan, parts, .. } = *job;
+    let inputs = parts.new_inputs(reader);
+    if inputs.is_empty() {
+        return Ok(ReadInputs::default());
+    }
+    let directory = &job.directory.part(reader);
+    once(job, directory, reader, JobStep::Read, |folder| {
+        let records = inputs.iter().map(|&input| plan.inputs[input].source.records).sum();
+        let stage = job.progress.stage("read", records, "points");
+        let (read, blocks) = read_inputs(plan, parts, job.directory, reader, malformed, job.syncs(), &stage)?;
+        blocks.save(&folder.store, reader)?;
+        Ok(folder.record(JobStep::Read, read, vec![stage.finish()])?)
+    })
+}
+
+/// Returns where the points of `part` are, which all of its readers must have found.
+///
+/// # Errors
+/// [`Error::DamagedSteps`] if points are damaged, [`sys::Error::Io`] if what a reader wrote down cannot be read.
+pub(crate) fn points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPart<'a>> {
+    let mut points = PointsOfPart::none(job.plan, job.parts, part);
+    for reader in job.parts.readers_of(part) {
+        let directory = job.directory.part(reader);
+        let entries = entries_of(&directory, job.header(reader))?;
+        let read = entries.iter().find(|entry| entry.step == JobStep::Read);
+        let read = read.ok_or_else(|| sys::Error::Broken(format!("the inputs of part {reader} were not read")))?;
+        let store = open_store(&directory, records_of(&entries).into_values())?;
+        points.add(reader, &store, &read.figures::<Done<ReadInputs>>()?.figures)?;
+    }
+    if job.checks_points && !points.are_whole(&job.directory.part(part))? {
+        return Err(Error::DamagedSteps);
+    }
+    Ok(points)
+}
+
+/// Sums up what all inputs held. Returns the sums and the box of the points.
+///
+/// # Errors
+/// [`sys::Error::Input`] if too many records are malformed, [`Error::NoTerrain`] or [`sys::Error::Config`] if no point is left,
+/// [`Error::TooFine`] if no mesh can hold the heights.
+pub(crate) fn sum_up<'a>(job: &Job, read: impl Iterator<Item = &'a ReadInputs>) -> Result<(PointSummary, Bounds<3>)> {
+    let mut read: Vec<ReadInputs> = read.cloned().collect();
+    read.iter_mut().for_each(|inputs| inputs.rename_inputs(job.plan));
+    check_malformed(job.plan, read.iter())?;
+    let mut summary = PointSummary::default();
+    read.into_iter().for_each(|inputs| summary += inputs.summary);
+    let points = summary.bounds.ok_or_else(|| no_point_is_left(job.plan, &summary.counts))?;
+    let bounds = job.plan.with_lines(points);
+    PrecisionLimit::of(&job.plan.frame).check_heights(bounds)?;
+    summary.counts.notes.extend(stretch_of_read(job.plan, bounds)?);
+    Ok((summary, bounds))
+}

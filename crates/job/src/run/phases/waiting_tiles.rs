@@ -1,0 +1,128 @@
+//! The front of a job that does its parts one after the other: the tiles that wait for parts to come. As soon as the parts around a tile
+//! are merged, it is written, and what it needed is given back to the disk, unless the job keeps its mesh. So a job holds no more than its
+//! front.
+
+use crate::index::{NodeIndex, PartIndex, TileIndex};
+use crate::records::StepRecord;
+use crate::run::job::Job;
+use crate::run::phases::join::{JoinedParts, merge_through};
+use crate::run::phases::meshed_part::{MeshedPart, SomeTiles};
+use crate::run::phases::part_store::PartStores;
+use crate::run::phases::tile_phase::{BorderSession, ForeignBorders};
+use crate::run::phases::tile_queue::TileAppearance;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::Arc;
+use sys::Result;
+
+/// The tiles of a part that are not written yet, each with the tiles that must be finished before it, if they are known.
+type TilesBefore = BTreeMap<TileIndex, Option<Vec<TileIndex>>>;
+
+/// A part with tiles that are not written yet.
+struct WaitingPart {
+    tiles: TilesBefore,
+    /// The tiles that touch other parts.
+    outer: HashSet<TileIndex>,
+    /// Whether the mesh stays once it is written.
+    is_kept: bool,
+}
+
+/// The tiles that wait for parts to come.
+pub(crate) struct WaitingTiles<'a> {
+    job: &'a Job<'a>,
+    stores: &'a PartStores,
+    appearance: Arc<TileAppearance>,
+    /// The tiles that merges may still change.
+    open: HashSet<TileIndex>,
+    waiting: BTreeMap<PartIndex, WaitingPart>,
+    /// The bytes that the store of each part keeps.
+    stored: HashMap<PartIndex, u64>,
+}
+
+impl<'a> WaitingTiles<'a> {
+    /// Returns the front before any part is done.
+    pub(crate) fn new(job: &'a Job<'a>, stores: &'a PartStores, appearance: Arc<TileAppearance>) -> WaitingTiles<'a> {
+        let (open, waiting, stored) = (HashSet::new(), BTreeMap::new(), HashMap::new());
+        WaitingTiles { job, stores, appearance, open, waiting, stored }
+    }
+
+    /// Returns the bytes that all parts so far keep on the disk.
+    pub(crate) fn stored(&self) -> u64 {
+        self.stored.values().sum()
+    }
+
+    /// Takes `part`, which is meshed: merges what is complete now, and writes the tiles that have waited for that.
+    ///
+    /// # Errors
+    /// Those of the steps.
+    pub(crate) fn pass(&mut self, part: PartIndex, meshed: &MeshedPart) -> crate::Result<()> {
+        let opened = self.stores.open(part)?;
+        self.stored.insert(part, opened.store.bytes());
+        self.open.extend(&meshed.open);
+        let SomeTiles { written, with_border, .. } = &opened.tiles;
+        let mut tiles: TilesBefore = opened.partition.tree.tiles().map(|tile| (tile, None)).collect();
+        with_border.iter().for_each(|(tile, before)| _ = tiles.insert(*tile, Some(before.clone())));
+        written.iter().for_each(|tile| _ = tiles.remove(tile));
+        self.waiting
+            .insert(part, WaitingPart { tiles, outer: meshed.open.iter().copied().collect(), is_kept: meshed.is_kept });
+        drop(opened);
+        for tile in merge_through(self.job, self.stores, part)? {
+            self.open.remove(&tile);
+        }
+        self.write_ready_tiles()
+    }
+
+    fn write_ready_tiles(&mut self) -> crate::Result<()> {
+        let WaitingTiles { job, stores, appearance, open, waiting, stored } = self;
+        let is_due = |(tile, before): (&TileIndex, &Option<Vec<TileIndex>>)| {
+            let all = before.iter().flatten().chain([tile]);
+            all.into_iter().all(|tile| !open.contains(tile))
+        };
+        let mut due = waiting.iter_mut().filter(|(_, part)| part.tiles.iter().any(is_due)).peekable();
+        if due.peek().is_some() {
+            let joined = JoinedParts::so_far(job, appearance.clone())?;
+            let borders = &ForeignBorders::new(job, stores, &joined);
+            for (&part, WaitingPart { tiles, outer, is_kept }) in due {
+                let directory = &job.directory.part(part);
+                let session = BorderSession::open(borders, directory, part, tiles.len())?;
+                let before = session.store().bytes();
+                let some = write_ready(&session, tiles, open)?;
+                if !*is_kept {
+                    free_written(&session, &some.written, tiles.is_empty().then_some(&*outer))?;
+                }
+                let after = session.finish(some)?;
+                let kept = stored.entry(part).or_default();
+                *kept = (*kept + after).saturating_sub(before);
+            }
+        }
+        self.waiting.retain(|_, part| !part.tiles.is_empty());
+        Ok(())
+    }
+}
+
+/// Finishes the borders of those of the `waiting` tiles that are not `open`, writes those whose neighbours are not open either, and takes
+/// them away.
+fn write_ready(session: &BorderSession, waiting: &mut TilesBefore, open: &HashSet<TileIndex>) -> Result<SomeTiles> {
+    let finished = waiting.iter().filter(|(tile, before)| before.is_none() && !open.contains(tile));
+    let finished: Vec<TileIndex> = finished.map(|(tile, _)| *tile).collect();
+    let with_border = session.finish_borders(&finished)?;
+    with_border.iter().for_each(|(tile, before)| _ = waiting.insert(*tile, Some(before.clone())));
+    let is_ready = |before: &Option<Vec<TileIndex>>| {
+        before.as_ref().is_some_and(|before| before.iter().all(|other| !open.contains(other)))
+    };
+    let written = waiting.iter().filter(|(_, before)| is_ready(before)).map(|(tile, _)| *tile);
+    let written: Vec<TileIndex> = written.collect();
+    written.iter().for_each(|tile| _ = waiting.remove(tile));
+    Ok(SomeTiles { stats: session.write_tiles(&written)?, written, with_border })
+}
+
+/// Gives up what `written` tiles needed. Once all tiles of a part are written, also what else no phase needs any more: all but the borders of
+/// its `outer` tiles, which other parts may still ask for.
+fn free_written(session: &BorderSession, written: &[TileIndex], outer: Option<&HashSet<TileIndex>>) -> Result<()> {
+    let (store, partition) = (session.store(), session.partition());
+    let tree = &partition.tree;
+    written.iter().flat_map(|&tile| partition.records_of_leaf(tile)).try_for_each(|record| store.free(record))?;
+    let Some(outer) = outer else { return Ok(()) };
+    let inner = tree.tiles().filter(|tile| !outer.contains(tile));
+    inner.into_iter().try_for_each(|tile| store.free(StepRecord::FinishedBorder(tile)))?;
+    (1..tree.nodes.len()).map(NodeIndex::new).try_for_each(|node| store.free(StepRecord::Seam(node)))
+}
