@@ -138,6 +138,17 @@ fn tasks_of_local_end_with_the_engine() {
     completes(&rig, 2, "after the engine was killed");
 }
 
+/// Begins all parts of `phase`, and stops the process while it works on the first.
+#[track_caller]
+fn stopped_worker(rig: &Rig, phase: &str) -> Run {
+    up_to(rig, phase, 1);
+    let before = stored(rig, 0);
+    let mut worker = Run::start(&mut task(rig, phase, "1/1"));
+    worker.wait_until(|| stored(rig, 0) > before);
+    worker.signal("STOP");
+    worker
+}
+
 /// Returns the bytes in the store of a part.
 fn stored(rig: &Rig, part: u32) -> u64 {
     let folder = rig.out().join(format!("job/parts/{part}"));
@@ -148,11 +159,7 @@ fn stored(rig: &Rig, part: u32) -> u64 {
 #[test]
 fn a_second_worker_leaves_a_part_that_another_has() {
     let rig = job_of_parts();
-    up_to(&rig, "mesh", 1);
-    let before = stored(&rig, 0);
-    let mut first = Run::start(&mut task(&rig, "mesh", "1/1"));
-    first.wait_until(|| stored(&rig, 0) > before);
-    first.signal("STOP");
+    let first = stopped_worker(&rig, "mesh");
     let second = run(task(&rig, "mesh", "1/1")).stopped(&["is left out: process", "is working in"]);
     assert!(second.err.contains(&format!("process {} on", first.child.id())), "{}", second.err);
     // It has done the others.
@@ -169,11 +176,7 @@ fn a_second_worker_leaves_a_part_that_another_has() {
 #[test]
 fn two_workers_of_the_phase_tiles_write_each_tile_once() {
     let rig = job_of_parts();
-    up_to(&rig, "tiles", 1);
-    let before = stored(&rig, 0);
-    let mut first = Run::start(&mut task(&rig, "tiles", "1/1"));
-    first.wait_until(|| stored(&rig, 0) > before);
-    first.signal("STOP");
+    let first = stopped_worker(&rig, "tiles");
     run(task(&rig, "tiles", "1/1")).stopped(&["is left out: process", "is working in"]);
     first.signal("CONT");
     first.end().succeeded();

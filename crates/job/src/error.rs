@@ -26,7 +26,7 @@ pub enum Error {
     TooEarly(String),
     /// A job stopped, and its complete phases are kept.
     #[error(
-        "{why}\nwhat is done is kept in {} ({phases} phases): {}, without --restart, to go on",
+        "{why}\nwhat is done is kept in {} (phases complete: {phases}): {}, without --restart, to go on",
         name(job),
         again(why)
     )]

@@ -24,9 +24,9 @@ pub type RecordRef = store::RecordRef<StepRecord>;
 pub type RecordChanges = store::RecordChanges<StepRecord>;
 /// The journal of a job.
 pub type Journal<'a> = journal::Journal<'a, JobStep, StepRecord>;
-/// A line that is to be added to it.
+/// A phase that is to be recorded in it.
 pub type NewEntry = journal::NewEntry<JobStep, StepRecord>;
-/// A line of a job's journal.
+/// A complete phase in it.
 pub type JournalEntry = journal::JournalEntry<JobStep, StepRecord>;
 
 /// A phase of a job, of a part of it, or of the nodes above the parts, as the journal of each names it.

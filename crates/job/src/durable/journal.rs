@@ -123,7 +123,7 @@ fn parse_line<T: DeserializeOwned>(line: &str) -> Option<T> {
     is_whole.then(|| serde_json::from_str(text).ok())?
 }
 
-/// The lines of a journal up to the first damaged one, read one at a time: the journal of a large job has hundreds of megabytes.
+/// The lines of a journal up to the first damaged one.
 struct JournalLines {
     path: PathBuf,
     reader: BufReader<File>,
@@ -158,6 +158,15 @@ impl JournalLines {
         self.reader.read_until(b'\n', &mut self.line).map_err(Error::io("read", &self.path))?;
         Ok(std::str::from_utf8(&self.line).ok().and_then(parse_line))
     }
+
+    /// Returns the entries in all lines to come.
+    fn entries<T: DeserializeOwned>(&mut self) -> Result<Vec<T>> {
+        let mut entries = Vec::new();
+        while let Some(mut complete) = self.next::<Vec<T>>()? {
+            entries.append(&mut complete);
+        }
+        Ok(entries)
+    }
 }
 
 /// The journal that an earlier run left: its header, unless that is damaged or of another version, and its entries up to the first
@@ -175,10 +184,8 @@ where
     K: RecordKey,
 {
     let Some(mut lines) = JournalLines::open(directory)? else { return Ok(None) };
-    let (header, mut entries) = (lines.next()?, Vec::new());
-    while let Some(mut complete) = if header.is_some() { lines.next()? } else { None } {
-        entries.append(&mut complete);
-    }
+    let header = lines.next()?;
+    let entries = if header.is_some() { lines.entries()? } else { Vec::new() };
     Ok(Some((header, entries)))
 }
 
@@ -200,9 +207,7 @@ where
 {
     let Some(mut lines) = JournalLines::open(directory)? else { return Ok(()) };
     if lines.next::<H>()?.is_some() {
-        while let Some(entries) = lines.next::<Vec<FilesOfStep<S>>>()? {
-            entries.into_iter().for_each(|FilesOfStep { step, files }| visit(step, files));
-        }
+        lines.entries()?.into_iter().for_each(|FilesOfStep { step, files }| visit(step, files));
     }
     Ok(())
 }
@@ -283,10 +288,7 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
         if lines.next::<H>()?.as_ref() != Some(header) {
             return Journal::begin(directory, header, Vec::new());
         }
-        let mut entries = Vec::new();
-        while let Some(mut complete) = lines.next()? {
-            entries.append(&mut complete);
-        }
+        let entries = lines.entries()?;
         let file = disk::open(&path).map_err(Error::io("open", &path))?;
         // A kill may have cut the last line off.
         disk::set_length(&file, lines.before).map_err(Error::io("write", &path))?;

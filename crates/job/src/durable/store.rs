@@ -70,6 +70,11 @@ impl<K: RecordKey> RecordRef<K> {
         self.key
     }
 
+    /// Returns the number of its bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.length
+    }
+
     fn place(&self) -> RecordPlace {
         RecordPlace { at: self.at, length: self.length }
     }

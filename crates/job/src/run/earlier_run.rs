@@ -297,7 +297,7 @@ pub(crate) struct RunStart<'a> {
 }
 
 /// Begins a run of the job with `header` in its locked directory: takes over what is the same from the earlier run if it is whole, and
-/// otherwise removes everything. `plan` tells whether its plan is that of this run. What tasks have done is not compared with its hashes
+/// otherwise removes everything. `has_plan` tells whether its plan is that of this run. What tasks have done is not compared with its hashes
 /// (`is_by_tasks`), because it was on the disk before others counted on it.
 ///
 /// # Errors
@@ -313,9 +313,8 @@ pub(crate) fn start<'a>(
     let progress_of_tasks = if is_by_tasks { ProgressOutput::Quiet } else { progress };
     let mut kept = earlier.and_then(|earlier| earlier.kept_for(header, has_plan, progress_of_tasks));
     if let (Some(earlier), false) = (&kept, is_by_tasks) {
-        let files = earlier.entries.iter().flat_map(|entry| &entry.files);
-        let stage = progress.stage("check", earlier.parts.len(), "steps");
-        let mut files = files.into_iter();
+        let stage = progress.stage("check", earlier.parts.len(), "phases");
+        let mut files = earlier.entries.iter().flat_map(|entry| &entry.files);
         let of_job = files.try_fold(true, |all, file| Ok::<_, Error>(all && file.try_is_whole(directory)?))?;
         let is_whole = of_job && earlier.parts.are_whole(&stage)?;
         stage.finish();
@@ -334,7 +333,7 @@ pub(crate) fn start<'a>(
     };
     let resumed = entries.len() as u64 + parts.len();
     if resumed > 0 {
-        progress_of_tasks.note(&format!("going on with an interrupted run: {resumed} phases are complete"));
+        progress_of_tasks.note(&format!("going on with an interrupted run; phases complete: {resumed}"));
     }
     // Only a plan that stays calls the inputs what they were called.
     let fingerprint = match has_plan {

@@ -1,6 +1,5 @@
 //! The merges above the parts.
 
-use crate::durable::directory::JobDirectory;
 use crate::durable::journal::records_of;
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::merge_records::{HullCount, Seam, SeamOfTile};
@@ -136,6 +135,12 @@ impl JoinedParts {
         let Some(entry) = entries.iter().find(|entry| entry.step == JobStep::Join) else { return Ok(None) };
         let Done { figures: all, stages, peak_memory, .. } = entry.figures::<Done<SitesOfParts>>()?;
         let store = open_store(&directory, records_of(&entries).into_values())?;
+        let tree = &job.parts.tree;
+        // Without the seam of a node, that node and those above it would be holes in the terrain.
+        let merges = (0..tree.nodes.len()).map(NodeIndex::new).filter(|&node| tree.is_merge(node));
+        if let Some(node) = merges.into_iter().find(|&node| !store.has(StepRecord::Seam(node))) {
+            return Err(sys::Error::Broken(format!("the seam of node {node} above the parts is gone")));
+        }
         let appearance = final_appearance(job, all, &store)?;
         Ok(Some(JoinedParts { store: Some(store), appearance, stages, peak_memory }))
     }
@@ -145,14 +150,10 @@ impl JoinedParts {
     /// # Errors
     /// As [`JoinedParts::open`].
     pub(crate) fn so_far(job: &Job, appearance: Arc<TileAppearance>) -> Result<JoinedParts> {
-        let directory: JobDirectory = job.directory.join();
-        let store = match is_needed(job) {
-            true => {
-                let entries = entries_of(&directory, job.header(job.above()))?;
-                Some(open_store(&directory, records_of(&entries).into_values())?)
-            }
-            false => None,
-        };
+        let directory = job.directory.join();
+        let entries = entries_of(&directory, job.header(job.above()))?;
+        let records = records_of(&entries).into_values();
+        let store = is_needed(job).then(|| open_store(&directory, records)).transpose()?;
         Ok(JoinedParts { store, appearance, stages: Vec::new(), peak_memory: None })
     }
 

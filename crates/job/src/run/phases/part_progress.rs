@@ -1,11 +1,12 @@
 //! What the journals of parts say of phases that are complete.
 
 use crate::durable::directory::JobDirectory;
+use crate::durable::journal::records_of;
 use crate::levels::make_level::LevelStats;
 use crate::partition::part_points::ReadInputs;
 use crate::phase::Phase;
 use crate::progress::stats::StageStats;
-use crate::records::{JobStep, JournalEntry};
+use crate::records::{JobStep, JournalEntry, RecordRef};
 use crate::run::done::Done;
 use crate::run::part_entries::{PartHeader, entries_of};
 use crate::run::phases::meshed_part::{MeshedPart, SomeTiles};
@@ -20,6 +21,8 @@ pub(crate) struct PartProgress {
     /// What is written of its tiles.
     pub(crate) tiles: SomeTiles,
     pub(crate) levels: Option<LevelStats>,
+    /// Bytes that its store keeps.
+    pub(crate) stored: u64,
     /// What each took.
     costs: Vec<(JobStep, Done<IgnoredAny>)>,
 }
@@ -30,8 +33,10 @@ impl PartProgress {
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the journal.
     pub(crate) fn of(directory: &JobDirectory, header: PartHeader) -> Result<PartProgress> {
-        let mut progress = PartProgress::default();
-        for entry in entries_of(directory, header)? {
+        let entries = entries_of(directory, header)?;
+        let stored = records_of(&entries).values().map(RecordRef::bytes).sum();
+        let mut progress = PartProgress { stored, ..PartProgress::default() };
+        for entry in entries {
             fn figures<T: DeserializeOwned>(entry: &JournalEntry) -> Result<T> {
                 entry.figures::<Done<T>>().map(|done| done.figures)
             }

@@ -58,10 +58,7 @@ pub(crate) fn publish_job(
 ) -> crate::Result<Report> {
     let parts = job.parts.all().map(|part| PartProgress::of(&job.directory.part(part), job.header(part)));
     let parts = parts.collect::<Result<Vec<PartProgress>>>()?;
-    let mut figures = PartFigures::of(&parts)?;
-    // Most tiles may have been written after the last part was meshed.
-    let stored = job.parts.all().map(|part| Ok(stores.open(part)?.store.bytes())).sum::<Result<u64>>()?;
-    figures.temporary = figures.temporary.max(stored);
+    let figures = PartFigures::of(&parts)?;
     some_triangles(&figures.tiles, job.plan)?;
     let (summary, bounds) = sum_up(job, parts.iter().filter_map(|part| part.read.as_ref()))?;
     add_stages(run, joined, &parts);
@@ -72,7 +69,7 @@ pub(crate) fn publish_job(
     let peak_memory = parts.iter().map(PartProgress::peak_memory).max().flatten().max(joined.peak_memory);
     let costs = CostsOfParts {
         slowest: (parts.len() > 1).then(|| slowest(&parts)).flatten(),
-        peak_memory: peak_memory.filter(|_| figures.by_tasks || parts.len() > 1),
+        peak_memory,
         cpu_s: if figures.by_tasks { processor_seconds(&parts) } else { 0.0 },
     };
     Ok(write_report(run, job, summary.counts, figures, costs, published)?)
@@ -116,7 +113,9 @@ impl PartFigures {
         let temporary = meshed.iter().map(|mesh| mesh.temporary);
         // All tasks together may have had as much at the same time.
         let by_tasks = meshed.iter().any(|mesh| mesh.by_task);
-        let temporary = if by_tasks { temporary.sum() } else { temporary.max().unwrap_or(0) };
+        let meshing: u64 = if by_tasks { temporary.sum() } else { temporary.max().unwrap_or(0) };
+        // Most tiles may have been written after the last part was meshed.
+        let temporary = meshing.max(parts.iter().map(|part| part.stored).sum());
         let points = meshed.iter().map(|mesh| mesh.points).collect();
         Ok(PartFigures { leaves, tiles, levels, points, temporary, by_tasks })
     }
