@@ -168,7 +168,11 @@ fn request(path: &Path, engine: Engine, tasks: u32, restart: bool) -> Result<Req
     let config = config::load(path)?;
     // The inputs may be where only the pods of Kubernetes see them.
     let is_out_of_sight = engine == Engine::Kubernetes && !config.output.directory.exists();
-    let phases = if is_out_of_sight || restart { PhaseTasks::all(tasks) } else { job::missing_tasks(&config, tasks)? };
+    let phases = if is_out_of_sight || restart {
+        PhaseTasks::all(tasks, config.output.selects())
+    } else {
+        job::missing_tasks(&config, tasks)?
+    };
     let submission = if restart { Some(job::new_submission()) } else { None };
     Ok(Request::new(path, &config, tasks, submission, phases)?)
 }

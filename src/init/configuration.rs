@@ -7,6 +7,8 @@ use crate::init::required_options::Runnable;
 use crs::Unit;
 use job::plan::job_plan::Plan;
 use job::preflight::check::Preflight;
+use job::preflight::selection_estimate::estimated_vertices;
+use job::progress::number_text::grouped;
 use points::Source;
 use tiles::page::is_built_in;
 
@@ -35,7 +37,7 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
     about_surface(&mut page, &findings, &sources, offers.ground);
     about_coordinates(&mut page, &findings, draft, (plan.crs.is_named(), offers.utm));
     about_area(&mut page, &sources);
-    about_output(&mut page, draft, preflight);
+    about_output(&mut page, draft, preflight, plan);
     page.blank();
     page.set("[limits]");
     page.say(&findings.memory);
@@ -118,7 +120,7 @@ fn about_area(page: &mut Page, sources: &[&Source]) {
     }
 }
 
-fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight) {
+fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight, plan: &Plan) {
     page.blank();
     page.set("[output]");
     if preflight.disk_earlier > 0 {
@@ -130,6 +132,9 @@ fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight) {
     let raster = format!("raster = {{ resolution = {cell} }}");
     page.offer("format = \"glb\"", "one file, as for Blender; \"3dtiles\" writes tiles for the web alone");
     page.offer("compression = \"none\"", "plain glTF, larger: QGIS needs it");
+    if let Some((option, what)) = max_error(preflight, plan) {
+        page.offer(&option, &what);
+    }
     page.offer("max_edge = \"auto\"", "leaves long triangles out, as over water; or a length such as 30.0");
     page.offer(&raster, "also writes the heights as terrain.tif, with cells of this side");
     page.offer("height_offset = \"egm96\"", "if heights count from the sea: then they are right on the globe");
@@ -137,6 +142,24 @@ fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight) {
     if is_built_in() {
         page.offer("page = true", "also writes a page that shows the terrain in a browser");
     }
+}
+
+/// Returns a bound on the error of the mesh with what it and two others lead to, if a sample of the points tells.
+fn max_error(preflight: &Preflight, plan: &Plan) -> Option<(String, String)> {
+    let bounds = if plan.frame.extras().metres_per_unit_z > 0.5 { [0.1, 0.3, 1.0] } else { [0.3, 1.0, 3.0] };
+    let vertices = estimated_vertices(plan, preflight.kept, &bounds).ok()?;
+    let triangles = |vertices: u64| grouped(2 * vertices);
+    let [first, second, third] = vertices[..] else { return None };
+    let what = format!(
+        "fewer triangles, with all points this near: about {} instead of {}; {}: {}, {}: {}",
+        triangles(first),
+        triangles(preflight.kept),
+        bounds[1],
+        triangles(second),
+        bounds[2],
+        triangles(third)
+    );
+    Some((format!("max_error = {}", bounds[0]), what))
 }
 
 fn about_breaklines(page: &mut Page) {

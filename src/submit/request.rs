@@ -90,7 +90,7 @@ pub(super) mod tests {
             program: "/opt/gdt-batch".into(),
             tasks,
             submission: None,
-            phases: PhaseTasks::all(tasks),
+            phases: PhaseTasks::all(tasks, true),
             memory: 4 << 30,
             threads: 0,
         }

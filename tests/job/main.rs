@@ -49,6 +49,7 @@ mod levels;
 mod limits;
 mod manual;
 mod many_tiles;
+mod max_error;
 mod messages;
 #[cfg(unix)]
 mod names;

@@ -99,7 +99,7 @@ fn add_jobs_of_one_part(documents: &Documents) {
     // The program believes in a GPU that is a millisecond late.
     let square = clouds::write(folder.path(), "square.csv", &clouds::uniform(6_000, 30_000, 8));
     let job = Job::on(&[&square]).tiles_of(500).threads(2).variable("GDT_GPU", "slow:1");
-    let job = job.with("output", "max_edge = 900.0").with("output.raster", "resolution = 500.0");
+    let job = job.with("output", "max_edge = 900.0\nmax_error = 9.0").with("output.raster", "resolution = 500.0");
     documents.run(&job);
     documents.verify(&job, &[&square], "proved");
     add_what_is_missing_or_wrong(documents, &job);

@@ -61,7 +61,7 @@ fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
     blocks.save(&store, first).unwrap();
     let mut points = PointsOfPart::none(&plan, &parts, first);
     points.add(first, &store, &read).unwrap();
-    let partition = points.partition(&folder).unwrap();
+    let partition = points.partition(&folder, plan.options.triangulation.max_points_per_tile.0).unwrap();
     let points = PointFiles::open(&folder.point_files().unwrap()).unwrap();
     let cpu = TriangulationOptions { backend: Backend::Cpu, ..TriangulationOptions::default() };
     let triangulator = Triangulator::new(&cpu, &delaunay_gpu::options::GpuOptions::default(), 1 << 28).unwrap();

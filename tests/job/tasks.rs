@@ -51,6 +51,34 @@ fn status(job: &Job, tasks: u32) -> Value {
     command(job, "status", &["--json", "--tasks", &tasks.to_string()]).succeeded().json()
 }
 
+/// Does all tasks of a job with `max_error`, which has one phase more.
+#[test]
+fn tasks_select_the_vertices_that_one_process_selects() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = in_files(folder.path(), &hills(20_000, 3), 4_000);
+    let job = || in_parts(&files, 2_500).with("output", "max_error = 20.0");
+    let one = job();
+    let report = one.report();
+    assert!(number(&report["parts"]) > 5 && number(&report["sites"]) < 15_000);
+    for tasks in [1, 3] {
+        let many = job();
+        local(&many, tasks).succeeded();
+        assert_eq!(bytes(&many), bytes(&one), "{tasks} tasks");
+    }
+    let many = job();
+    for phase in ["plan", "read"] {
+        task(&many, phase, "1/1").succeeded();
+    }
+    task(&many, "mesh", "1/1").refused(1, &["select is not complete: task 1 of 1 is missing"]);
+    let phases = status(&many, 1)["phases"].as_array().unwrap().clone();
+    let select = phases.iter().find(|phase| phase["phase"] == "select").unwrap();
+    assert_eq!((&select["done"], &select["of"]), (&json!(0), &json!(1)));
+    for phase in ["select", "mesh", "join", "tiles", "levels", "publish"] {
+        task(&many, phase, "1/1").succeeded();
+    }
+    assert_eq!(bytes(&many), bytes(&one), "phase by phase");
+}
+
 #[test]
 fn any_number_of_tasks_leaves_the_bytes_of_one_process() {
     let folder = tempfile::tempdir().unwrap();

@@ -16,6 +16,8 @@ pub enum Phase {
     Plan,
     /// Reads the inputs that a part is the first to need.
     Read,
+    /// Selects the vertices of all parts, in a job with `[output] max_error`.
+    Select,
     /// Triangulates a part, and writes the tiles that need no other.
     Mesh,
     /// Merges what the parts send up.
@@ -30,14 +32,28 @@ pub enum Phase {
 
 impl Phase {
     /// All phases in their order.
-    pub const ALL: [Phase; 7] =
-        [Phase::Plan, Phase::Read, Phase::Mesh, Phase::Join, Phase::Tiles, Phase::Levels, Phase::Publish];
+    pub const ALL: [Phase; 8] = [
+        Phase::Plan,
+        Phase::Read,
+        Phase::Select,
+        Phase::Mesh,
+        Phase::Join,
+        Phase::Tiles,
+        Phase::Levels,
+        Phase::Publish,
+    ];
+
+    /// Returns the phases of a job in their order. Only a job that selects vertices has [`Phase::Select`].
+    pub fn of_job(selects: bool) -> impl Iterator<Item = Phase> {
+        Phase::ALL.into_iter().filter(move |phase| selects || *phase != Phase::Select)
+    }
 
     /// Returns its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Phase::Plan => "plan",
             Phase::Read => "read",
+            Phase::Select => "select",
             Phase::Mesh => "mesh",
             Phase::Join => "join",
             Phase::Tiles => "tiles",
@@ -48,7 +64,7 @@ impl Phase {
 
     /// Tells whether it is done part by part, and so can be dealt out to several tasks.
     pub fn is_by_part(self) -> bool {
-        !matches!(self, Phase::Plan | Phase::Join | Phase::Publish)
+        !matches!(self, Phase::Plan | Phase::Select | Phase::Join | Phase::Publish)
     }
 
     /// Returns how many tasks it has where phases are dealt out to `tasks` tasks.
@@ -75,11 +91,11 @@ pub struct PhaseTasks {
 }
 
 impl PhaseTasks {
-    /// Returns all phases with all of their tasks, where phases are dealt out to `tasks` tasks.
-    pub fn all(tasks: u32) -> Vec<PhaseTasks> {
+    /// Returns all phases of a job with all of their tasks, where phases are dealt out to `tasks` tasks.
+    pub fn all(tasks: u32, selects: bool) -> Vec<PhaseTasks> {
         let all =
             |phase: Phase| PhaseTasks { phase, count: phase.tasks(tasks), missing: (1..=phase.tasks(tasks)).collect() };
-        Phase::ALL.map(all).to_vec()
+        Phase::of_job(selects).map(all).collect()
     }
 }
 

@@ -36,6 +36,8 @@ pub enum JobStep {
     Plan,
     /// Reads the inputs that a part is the first to need.
     Read,
+    /// Selects the points of a part that are vertices, with all other parts.
+    Select,
     /// Triangulates a part.
     Mesh,
     /// Writes tiles of a part. There is a line for those that are written at one time.
@@ -75,6 +77,8 @@ pub enum StepRecord {
     Partition,
     /// The points by bucket that a reader has found.
     Read(PartIndex),
+    /// The selected points by bucket.
+    Selected,
     /// How many sites there are around every place.
     Spacing,
     /// [`LevelSummary`]
@@ -97,6 +101,7 @@ impl RecordKey for StepRecord {
             StepRecord::Tile(tile) => [9, tile.0],
             StepRecord::Read(part) => [10, part.0],
             StepRecord::Spacing => [11, 0],
+            StepRecord::Selected => [12, 0],
         }
     }
 }

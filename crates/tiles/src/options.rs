@@ -40,6 +40,9 @@ pub struct OutputOptions {
     /// How tiles are packed.
     #[serde(default)]
     pub compression: CompressionChoice,
+    /// How far a point may be from the mesh. `None` is a mesh of all points.
+    #[serde(default, skip_serializing_if = "MaxError::is_none")]
+    pub max_error: MaxError,
     /// The longest edge of a triangle that is not left out.
     #[serde(default)]
     pub max_edge: MaxEdge,
@@ -61,6 +64,11 @@ impl OutputOptions {
     /// Returns whose the data are, if the user says.
     pub fn copyright(&self) -> Option<&str> {
         self.copyright.as_ref().map(|copyright| copyright.0.as_str())
+    }
+
+    /// Tells whether vertices are selected from the points.
+    pub fn selects(&self) -> bool {
+        !self.max_error.is_none()
     }
 
     /// Returns how tiles are packed.
@@ -171,6 +179,50 @@ pub enum Hull {
     Trimmed,
     /// They stay, and the terrain reaches to the convex hull.
     Whole,
+}
+
+/// How far a point may be from the mesh along the vertical, in source units of height. Only points that this takes are vertices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Value", into = "toml::Value")]
+pub enum MaxError {
+    /// All points are vertices.
+    #[default]
+    None,
+    /// So many units.
+    Units(f64),
+}
+
+impl MaxError {
+    /// Tells whether all points are vertices.
+    pub fn is_none(&self) -> bool {
+        *self == MaxError::None
+    }
+}
+
+impl TryFrom<toml::Value> for MaxError {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> std::result::Result<MaxError, String> {
+        let units = match value {
+            toml::Value::String(s) if s == "none" => return Ok(MaxError::None),
+            toml::Value::Integer(i) => i as f64,
+            toml::Value::Float(f) => f,
+            _ => -1.0,
+        };
+        match units > 0.0 && units.is_finite() {
+            true => Ok(MaxError::Units(units)),
+            false => Err("max_error is \"none\" or a positive number of source units of height, such as 0.1".into()),
+        }
+    }
+}
+
+impl From<MaxError> for toml::Value {
+    fn from(max_error: MaxError) -> toml::Value {
+        match max_error {
+            MaxError::None => toml::Value::String("none".into()),
+            MaxError::Units(units) => toml::Value::Float(units),
+        }
+    }
 }
 
 /// How long an edge of a triangle may be in the plane. Triangles with a longer edge are left out.

@@ -33,6 +33,29 @@ pub(super) struct BreaklineEdges {
     failure: Option<String>,
 }
 
+/// Where a job with breaklines may have dropped points: in the discs of edges, and between edges alone, as in lakes.
+pub(super) struct DroppedZones<'a> {
+    lines: &'a BreaklineEdges,
+    /// No edge is longer than the side of a cell along x or y.
+    side: i64,
+    /// The edges by the cell that their middle lies in.
+    by_cell: HashMap<[i64; 2], Vec<[Site; 2]>>,
+}
+
+impl DroppedZones<'_> {
+    /// Tells whether a point, which lies in this `triangle` if in any, may have been dropped.
+    pub(super) fn hold(&self, point: Site, triangle: Option<[Site; 3]>) -> bool {
+        let is_end = |corner: &Site| self.lines.heights.contains_key(corner);
+        if triangle.is_some_and(|corners| corners.iter().all(is_end)) {
+            return true;
+        }
+        let [column, row] = point.map(|value| i64::from(value).div_euclid(self.side));
+        let cells = (-1..=1).flat_map(|down| (-1..=1).map(move |right| [column + right, row + down]));
+        let mut near = cells.filter_map(|cell| self.by_cell.get(&cell)).flatten();
+        near.any(|&[a, b]| is_in_disc(a, b, point))
+    }
+}
+
 impl BreaklineEdges {
     /// Reads the list in the output `directory` of a job, which lies on its `lattice`; `None` if there is none.
     ///
@@ -124,6 +147,18 @@ impl BreaklineEdges {
                 }
             }
         }
+    }
+
+    /// Returns where the job may have dropped points.
+    pub(super) fn zones(&self) -> DroppedZones<'_> {
+        let length = |&[a, b]: &[Site; 2]| (0..2).map(|k| (i64::from(a[k]) - i64::from(b[k])).abs()).max().unwrap_or(0);
+        let side = self.edges.iter().map(length).max().unwrap_or(0).max(1);
+        let mut by_cell = HashMap::<[i64; 2], Vec<[Site; 2]>>::new();
+        for edge in &self.edges {
+            let middle = [0, 1].map(|k| (i64::from(edge[0][k]) + i64::from(edge[1][k])).div_euclid(2));
+            by_cell.entry(middle.map(|value| value.div_euclid(side))).or_default().push(*edge);
+        }
+        DroppedZones { lines: self, side, by_cell }
     }
 
     /// Returns a sentence about the edges that no triangle has.

@@ -12,6 +12,7 @@ use crate::breaklines::BreaklineEdges;
 use crate::keyed_records::{KeyedRecord, KeyedRecords};
 use crate::report::ReportedFacts;
 use crate::source_grid::SourceGrid;
+use crate::surface::{Bound, Surface, SurfaceProof};
 use delaunay::geometry::Site;
 use lattice::{AxisMap, Lattice, shortest_decimal};
 use points::options::Duplicates;
@@ -21,6 +22,7 @@ use points::{
     KeptReturns, NodataChoice, OptionalFields, Point, PointRules, RowChoice, Source, TextOptions, TextReading,
     open_chosen,
 };
+use rust_decimal::prelude::ToPrimitive;
 use sys::{Error, Result, Warnings, interrupt};
 use tiles::frame::Extras;
 
@@ -82,6 +84,8 @@ impl Places {
 pub(super) struct InputProof {
     /// The points of the inputs that the job wanted, duplicates included.
     pub(super) points: u64,
+    /// The greatest vertical distance of a point from the mesh, in source units, if not all are vertices.
+    pub(super) greatest_error: Option<f64>,
     pub(super) failures: Vec<String>,
     pub(super) unproved: Option<String>,
 }
@@ -135,13 +139,15 @@ impl<'a> Inputs<'a> {
         Ok(Inputs { facts, lattice: lattice_of(facts, extras)?, sources, files })
     }
 
-    /// Compares the vertices in `places` with the points of the inputs, and with the ends of the edges along breaklines.
+    /// Compares the vertices in `places` with the points of the inputs, and with the ends of the edges along breaklines. Points that are no
+    /// vertices are compared with the `surface`, if there is one.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] if an input cannot be read, [`Error::Io`] on temporary files.
     pub(super) fn compare(
         &self,
         places: Places,
+        surface: Option<Surface>,
         lines: Option<&BreaklineEdges>,
         grid: &SourceGrid,
     ) -> Result<InputProof> {
@@ -158,14 +164,38 @@ impl<'a> Inputs<'a> {
         }
         let duplicates = self.facts.input.as_ref().map(|input| input.duplicates);
         let has_lines = lines.is_some();
-        let mut differences =
-            Differences { inputs: self, duplicates, grid, points: 0, dropped: 0, has_lines, kinds: Default::default() };
+        let selects = surface.is_some();
+        let mut differences = Differences {
+            inputs: self,
+            duplicates,
+            grid,
+            points: 0,
+            dropped: 0,
+            has_lines,
+            not_selected: selects.then(Vec::new),
+            kinds: Default::default(),
+        };
         let records = places.0.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut failure = None;
         records.for_each_bucket(|bucket| {
             bucket.par_sort_unstable();
             bucket.chunk_by(|a, b| a.site == b.site).for_each(|group| differences.add(group));
+            if let (Some(surface), Some(points)) = (&surface, &mut differences.not_selected) {
+                failure = failure.take().or(surface.add_points(points).err());
+                points.clear();
+            }
         })?;
-        self.proof(differences)
+        failure.map_or(Ok(()), Err)?;
+        let on_surface = surface.map(|surface| self.check_surface(surface, lines)).transpose()?;
+        self.proof(differences, on_surface)
+    }
+
+    /// Compares the points that are no vertices with the mesh. Without a bound, nothing is known.
+    fn check_surface(&self, surface: Surface, lines: Option<&BreaklineEdges>) -> Result<Option<SurfaceProof>> {
+        let bound = self.facts.selection.and_then(|selection| shortest_decimal(selection.max_error));
+        let bound = bound.and_then(|bound| Bound::new(bound, self.lattice.resolution_z));
+        let zones = lines.map(BreaklineEdges::zones);
+        bound.map(|bound| surface.check(bound, zones.as_ref())).transpose()
     }
 
     fn rules(&self, source: &Source, first_order: u64) -> Result<PointRules> {
@@ -188,10 +218,15 @@ impl<'a> Inputs<'a> {
         })
     }
 
-    fn proof(&self, differences: Differences) -> Result<InputProof> {
+    fn proof(&self, differences: Differences, on_surface: Option<Option<SurfaceProof>>) -> Result<InputProof> {
         let (points, mut failures) = (differences.points, differences.sentences());
         let dropped = self.facts.points.map_or(0, |points| points.at_breaklines);
-        if differences.dropped != dropped && self.facts.input.is_some() {
+        let step = self.lattice.resolution_z.to_f64().unwrap_or(f64::NAN);
+        let greatest_error = on_surface.flatten().map(|proof| proof.greatest * step);
+        let has_no_bound = on_surface.is_some_and(|proof| proof.is_none());
+        if let Some(proof) = on_surface.flatten() {
+            failures.extend(differences.beyond(&proof, dropped));
+        } else if on_surface.is_none() && differences.dropped != dropped && self.facts.input.is_some() {
             failures.push(format!(
                 "{} points of the inputs are no vertices, where report.json says that {dropped} were dropped at breaklines",
                 differences.dropped
@@ -212,7 +247,9 @@ impl<'a> Inputs<'a> {
             "points may be missing: there is no report.json that says which points of the inputs the job wanted"
                 .to_owned()
         });
-        Ok(InputProof { points, failures, unproved })
+        let no_bound = || "the max_error in report.json is no bound on this lattice".to_owned();
+        let unproved = unproved.or_else(|| has_no_bound.then(no_bound));
+        Ok(InputProof { points, greatest_error, failures, unproved })
     }
 }
 
@@ -246,6 +283,8 @@ struct Differences<'a> {
     /// The points that are no vertices, of a job with breaklines: these may have dropped them.
     dropped: u64,
     has_lines: bool,
+    /// The points of the present bucket that are no vertices, of a job that selects vertices.
+    not_selected: Option<Vec<[i32; 3]>>,
     kinds: [Difference; 3],
 }
 
@@ -274,6 +313,10 @@ impl Differences<'_> {
         }
         match (vertices.first(), self.point_that_stays(points)) {
             (Some(&vertex), None) => self.note(NO_POINT, [vertex, vertex]),
+            (None, Some(point)) if self.not_selected.is_some() => {
+                let [x, y] = point.site;
+                self.not_selected.iter_mut().for_each(|points| points.push([x, y, point.height]));
+            }
             (None, Some(_)) if self.has_lines => self.dropped += points.len() as u64,
             // Without a rule the job may not have wanted this point.
             (None, Some(point)) if self.duplicates.is_some() => self.note(NO_VERTEX, [point, point]),
@@ -325,6 +368,31 @@ impl Differences<'_> {
             })
         };
         self.kinds.iter().enumerate().filter_map(sentence).collect()
+    }
+
+    /// Returns a sentence for points that are too far from the mesh, and were not among those `dropped` at breaklines.
+    fn beyond(&self, proof: &SurfaceProof, dropped: u64) -> Option<String> {
+        let SurfaceProof { beyond, first_beyond, uncovered, first_uncovered, excused, .. } = *proof;
+        let text = |[x, y, z]: [i32; 3]| {
+            let [x, y, z] = self.grid.coordinates([x, y, z]);
+            format!("({x}, {y}, {z})")
+        };
+        let max_error = self.inputs.facts.selection.map_or(f64::NAN, |selection| selection.max_error);
+        let outside = || {
+            let first = first_uncovered.map(text)?;
+            Some(format!("points of the inputs outside the mesh: {uncovered}, the first at {first}"))
+        };
+        let too_far = first_beyond.map(|first| {
+            format!(
+                "points of the inputs that are more than max_error = {max_error} from the mesh: {beyond}, the first at {}",
+                text(first)
+            )
+        });
+        let too_many = (excused > dropped).then(|| {
+            format!("{excused} points beyond max_error lie at breaklines, where report.json says that {dropped} were dropped there")
+        });
+        let sentences: Vec<String> = too_far.into_iter().chain(outside()).chain(too_many).collect();
+        (!sentences.is_empty()).then(|| sentences.join("; "))
     }
 
     fn hint(&self) -> &'static str {

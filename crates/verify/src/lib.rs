@@ -51,6 +51,11 @@
 //! vertex lies in that disc either. The number of edges is compared with the report. Which points of the inputs lay in a disc or
 //! in a lake, and were dropped, is not proved one by one: [`verify_against`] compares their number with the report.
 //!
+//! # Selected points
+//!
+//! With `[output] max_error` not all points are vertices. [`verify_against`] proves that each of the others is within the bound of the triangle
+//! below or above it (`surface.rs`).
+//!
 //! # What the job wrote
 //!
 //! All of this also holds for a terrain that was changed consistently: one vertex raised, say, or all tiles moved. So every file is
@@ -76,6 +81,7 @@ mod keyed_records;
 mod mesh_check;
 mod report;
 mod source_grid;
+mod surface;
 mod tile_files;
 mod verdict;
 mod written_files;
@@ -98,6 +104,7 @@ use crate::findings::Findings;
 use crate::inputs::{Inputs, Places, lattice_of};
 use crate::mesh_check::check_mesh;
 use crate::report::ReadReport;
+use crate::surface::Surface;
 use crate::tile_files::TileFiles;
 use crate::verdict::CheckedMesh;
 use crate::written_files::WrittenFiles;
@@ -147,10 +154,12 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     };
     let lattice = || lattice_of(&report.facts, &files.extras);
     let lines = BreaklineEdges::read(directory, lattice, memory / 4)?;
+    let has_surface = inputs.is_some() && report.facts.selection.is_some();
     let run = Verification {
         lines: lines.as_ref(),
         borders: Mutex::new(Borders::new(directory, memory / 4)),
-        places: inputs.is_some().then(|| Places::new(directory, memory / 4)),
+        places: inputs.is_some().then(|| Places::new(directory, if has_surface { memory / 8 } else { memory / 4 })),
+        surface: has_surface.then(|| Surface::new(directory, memory / 8)),
         files: &files,
         grid: &grid,
         next: AtomicUsize::new(0),
@@ -162,7 +171,8 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     let matches = borders.match_all(&grid, &files)?;
     let checked_lines = lines.as_ref().map(|lines| CheckedBreaklines::of(lines, &grid));
     let proof =
-        inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, lines.as_ref(), &grid)).transpose()?;
+        inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, run.surface, lines.as_ref(), &grid));
+    let proof = proof.transpose()?;
     Ok(Verdict::new(CheckedMesh { files: &files, findings, matches, lines: checked_lines }, &report, &written, proof))
 }
 
@@ -186,6 +196,8 @@ struct Verification<'a> {
     borders: Mutex<Borders>,
     /// The vertices of all tiles, if they are to be compared with the inputs.
     places: Option<Places>,
+    /// The triangles, if points that are no vertices are to be compared with them.
+    surface: Option<Surface>,
     /// The number of the next file to check.
     next: AtomicUsize,
 }
@@ -221,6 +233,9 @@ impl Verification<'_> {
             }
             if let Some(places) = &self.places {
                 places.add_vertices(&vertices)?;
+            }
+            if let Some(surface) = self.surface.as_ref().filter(|_| !vertices.is_empty()) {
+                surface.add_triangles(&vertices, &mesh.triangles)?;
             }
             if number >= self.files.terrain {
                 findings.cut_triangles += mesh.triangles.len() as u64;

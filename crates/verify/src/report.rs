@@ -23,6 +23,8 @@ pub(super) struct ReportedFacts {
     pub(super) cut_triangles: Option<u64>,
     /// The edges along breaklines; `None` if the job had none.
     pub(super) breaklines: Option<ReportedBreaklines>,
+    /// How the vertices were selected; `None` if all points are vertices.
+    pub(super) selection: Option<ReportedSelection>,
     /// What became of the points of the inputs.
     pub(super) points: Option<ReportedPoints>,
     pub(super) lattice: Option<Lattice>,
@@ -47,6 +49,13 @@ pub(super) struct ReportedFacts {
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub(super) struct ReportedBreaklines {
     pub(super) subsegments: u64,
+}
+
+/// What a report says of the selection of vertices.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub(super) struct ReportedSelection {
+    /// The bound on the vertical distance of points from the mesh, in source units of height.
+    pub(super) max_error: f64,
 }
 
 /// What a report says of points.

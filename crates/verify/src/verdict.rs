@@ -17,7 +17,7 @@ use delaunay::geometry::Site;
 use lattice::VertexDigest;
 
 /// The counts of a verified mesh, and what does not hold.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Verdict {
     /// Tile files.
     pub tiles: u64,
@@ -43,6 +43,8 @@ pub struct Verdict {
     pub files: u64,
     /// The points of the inputs that the job wanted, if the vertices were compared with them.
     pub points: Option<u64>,
+    /// The greatest vertical distance of a point from the mesh, in source units, if points were compared and not all are vertices.
+    pub greatest_error: Option<f64>,
     /// What does not hold, in sentences.
     pub failures: Vec<String>,
     /// What could not be proved because something is missing: `cut/`, the report, or another file.
@@ -129,8 +131,8 @@ impl Verdict {
     }
 
     fn add_inputs(&mut self, inputs: Option<InputProof>, is_cut_gone: bool) {
-        let Some(InputProof { points, failures, unproved }) = inputs else { return };
-        self.points = Some(points);
+        let Some(InputProof { points, greatest_error, failures, unproved }) = inputs else { return };
+        (self.points, self.greatest_error) = (Some(points), greatest_error);
         if is_cut_gone {
             self.doubt("the vertices cannot be compared with the inputs without cut/".into());
         } else {
@@ -180,6 +182,9 @@ impl Verdict {
     /// Returns the conclusion as a sentence.
     pub fn sentence(&self) -> &'static str {
         match (self.verdict, self.is_mesh_sound, self.points.is_some()) {
+            (Conclusion::Proved, _, true) if self.greatest_error.is_some() => {
+                "proved: the exact Delaunay triangulation of points of the inputs, all others within max_error"
+            }
             (Conclusion::Proved, _, true) => "proved: the exact Delaunay triangulation of the inputs' points",
             (Conclusion::Proved, _, false) => "proved: the exact Delaunay triangulation",
             (Conclusion::AsFarAsCanBeTold, ..) => "Delaunay as far as can be told, but not proved",
@@ -268,6 +273,9 @@ impl fmt::Display for Verdict {
         writeln!(f, "{:<20}{:>34}", "unchanged files", self.files)?;
         if let Some(points) = self.points {
             writeln!(f, "{:<20}{:>34}", "points of the inputs", points)?;
+        }
+        if let Some(error) = self.greatest_error {
+            writeln!(f, "{:<20}{error:>34}", "greatest error")?;
         }
         for failure in &self.failures {
             writeln!(f, "FAILS: {failure}")?;

@@ -10,7 +10,8 @@ mod terrain;
 
 use crate::program::{Job, gdt_batch, number};
 use files::{Features, geojson, geopackage, shapefile};
-use terrain::{ISLAND, LAKE, Mesh, Survey, cross, inside};
+pub(crate) use terrain::Survey;
+use terrain::{ISLAND, LAKE, Mesh, cross, inside};
 
 /// The river comes from GeoJSON, the lake from a GeoPackage, and lines that cross from a Shapefile.
 #[test]

@@ -27,12 +27,12 @@ pub(super) const ISLAND: [[i64; 2]; 4] = [[10_500, 10_000], [12_000, 10_100], [1
 /// Points in random places on a slope. Ten are marked as ignored ground.
 pub(crate) struct Survey {
     folder: TempDir,
-    pub(super) cloud: PathBuf,
+    pub(crate) cloud: PathBuf,
     points: HashSet<[i64; 3]>,
 }
 
 impl Survey {
-    pub(super) fn new(count: usize) -> Survey {
+    pub(crate) fn new(count: usize) -> Survey {
         let (folder, mut random) = (tempfile::tempdir().unwrap(), Random(5));
         let (mut text, mut points, mut places) =
             (String::from("x,y,z,classification\n"), HashSet::new(), BTreeSet::new());
@@ -77,7 +77,7 @@ impl Survey {
     }
 
     /// Returns a job with all lines.
-    pub(super) fn job(&self) -> Job {
+    pub(crate) fn job(&self) -> Job {
         self.job_with(&self.lines(), "kind_field = \"kind\"")
     }
 

@@ -14,7 +14,10 @@ use crate::plan::job_plan::Plan;
 use delaunay::geometry::Site;
 
 /// An edge is long from this many times the mean spacing of all points on.
-const SPACINGS: u128 = 10;
+const SPACINGS: u64 = 10;
+/// The same where `max_error` selects few of them: on flat ground, edges are as long as the cells of [`selection`] that have a vertex each, and
+/// some hundred spacings.
+const SPACINGS_OF_SELECTED: u64 = 400;
 
 /// The rule of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,13 +29,15 @@ pub struct HullRule {
 impl HullRule {
     /// Returns the rule of a job. It follows from what headers tell, so every step knows it, whatever the parts and tiles.
     pub fn of(plan: &Plan) -> HullRule {
-        HullRule::of_points(plan.records, plan.claimed_area)
+        let spacings = if plan.options.output.selects() { SPACINGS_OF_SELECTED } else { SPACINGS };
+        HullRule::of_points(plan.records, plan.claimed_area, spacings)
     }
 
-    /// Returns the rule where so many points share an `area` in square lattice steps. No two of them that stay are nearer than a step.
-    fn of_points(points: u64, area: u64) -> HullRule {
+    /// Returns the rule where so many points share an `area` in square lattice steps, and an edge is long from so many of their spacings on. No
+    /// two points that stay are nearer than a step.
+    fn of_points(points: u64, area: u64, spacings: u64) -> HullRule {
         let points = points.max(1);
-        let limit = SPACINGS * SPACINGS * u128::from(area.max(points)) / u128::from(points);
+        let limit = u128::from(spacings * spacings) * u128::from(area.max(points)) / u128::from(points);
         HullRule { limit: u64::try_from(limit).unwrap_or(u64::MAX) }
     }
 
@@ -76,7 +81,7 @@ mod tests {
 
     #[test]
     fn only_obtuse_triangles_with_a_long_edge_flow() {
-        let rule = HullRule::of_points(1, 1);
+        let rule = HullRule::of_points(1, 1, SPACINGS);
         assert_eq!(rule.flow([[0, 0], [11, 0], [5, 1]]), Some(0));
         assert_eq!(rule.flow([[5, 1], [0, 0], [11, 0]]), Some(1));
         assert_eq!(rule.flow([[0, 0], [10, 0], [5, 1]]), None, "not long");

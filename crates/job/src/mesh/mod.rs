@@ -6,4 +6,5 @@ pub mod hull_rule;
 pub mod leaf;
 pub mod merge;
 pub mod precision_limit;
+pub(crate) mod selection;
 pub mod sites;

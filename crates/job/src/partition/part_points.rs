@@ -84,7 +84,35 @@ impl ReadBlocks {
     /// # Errors
     /// [`Error::Io`].
     pub fn save(&self, store: &Store, reader: PartIndex) -> Result<()> {
-        ColumnWriter::default().push(&self.buckets).push(&self.blocks).write(store, StepRecord::Read(reader))
+        self.save_as(store, StepRecord::Read(reader))
+    }
+
+    /// Writes the record `key`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(crate) fn save_as(&self, store: &Store, key: StepRecord) -> Result<()> {
+        ColumnWriter::default().push(&self.buckets).push(&self.blocks).write(store, key)
+    }
+
+    /// Returns the blocks of these buckets.
+    pub(crate) fn of(buckets: Vec<Bucket>) -> ReadBlocks {
+        let mut read = ReadBlocks::default();
+        for (number, bucket) in (0..).zip(buckets) {
+            read.blocks.extend(bucket.blocks);
+            read.buckets.resize(read.blocks.len(), number);
+        }
+        read
+    }
+
+    /// Returns the bytes of all blocks.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.blocks.iter().map(PointBlock::bytes).sum()
+    }
+
+    /// Returns the number of blocks.
+    pub(crate) fn len(&self) -> u64 {
+        self.blocks.len() as u64
     }
 }
 
@@ -141,6 +169,11 @@ pub fn read_inputs(
     Ok((ReadInputs { summary, by_part, malformed, inputs }, read))
 }
 
+/// Returns the number of the file with the selected points of a part. Readers, and what divides crowded buckets, have lower numbers.
+pub(crate) fn file_of_selected(parts: &Parts) -> u16 {
+    parts.all().len() as u16 + 1
+}
+
 /// Makes the reader's point file for `part` if one of its inputs reaches it.
 fn create(parts: &Parts, directory: &JobDirectory, reader: PartIndex, part: PartIndex) -> Result<Option<PointFile>> {
     if !parts.new_inputs(reader).iter().any(|&input| parts.reaches(input, part)) {
@@ -172,11 +205,12 @@ pub fn check_malformed<'a>(plan: &Plan, read: impl Iterator<Item = &'a ReadInput
     }
 }
 
-/// The points of a part, which all of its readers have found.
+/// The points of a part, which all of its readers have found, or the selected ones.
 pub struct PointsOfPart<'a> {
     plan: &'a Plan,
     parts: &'a Parts,
     part: PartIndex,
+    are_selected: bool,
     /// The blocks, each with the number of its bucket.
     blocks: Vec<(u32, PointBlock)>,
 }
@@ -184,7 +218,17 @@ pub struct PointsOfPart<'a> {
 impl<'a> PointsOfPart<'a> {
     /// Returns no points of `part`.
     pub fn none(plan: &'a Plan, parts: &'a Parts, part: PartIndex) -> PointsOfPart<'a> {
-        PointsOfPart { plan, parts, part, blocks: Vec::new() }
+        PointsOfPart { plan, parts, part, are_selected: false, blocks: Vec::new() }
+    }
+
+    /// Returns the selected points of the part, `blocks` blocks that its `store` has.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on the store.
+    pub(crate) fn selected(mut self, store: &Store, blocks: u64) -> Result<PointsOfPart<'a>> {
+        self.are_selected = true;
+        self.add_blocks(store, StepRecord::Selected, 0, blocks as usize)?;
+        Ok(self)
     }
 
     /// Adds what `reader` has found for the part, with the store of the reader.
@@ -199,11 +243,14 @@ impl<'a> PointsOfPart<'a> {
             is_own
         });
         let Some(own) = own else { return Ok(()) };
-        let key = StepRecord::Read(reader);
-        let buckets = ColumnReader::open(store, key)?.column_part::<u32>(first, own.blocks as usize)?;
+        self.add_blocks(store, StepRecord::Read(reader), first, own.blocks as usize)
+    }
+
+    fn add_blocks(&mut self, store: &Store, key: StepRecord, first: usize, count: usize) -> Result<()> {
+        let buckets = ColumnReader::open(store, key)?.column_part::<u32>(first, count)?;
         let mut columns = ColumnReader::open(store, key)?;
         columns.skip_column::<u32>()?;
-        let blocks = columns.column_part::<PointBlock>(first, own.blocks as usize)?;
+        let blocks = columns.column_part::<PointBlock>(first, count)?;
         self.blocks.extend(buckets.iter().copied().zip(blocks.iter().copied()));
         Ok(())
     }
@@ -218,19 +265,18 @@ impl<'a> PointsOfPart<'a> {
         whole.try_reduce(|| true, |a, b| Ok(a && b))
     }
 
-    /// Cuts the part into tiles. `directory` is that of the part.
+    /// Cuts the part into tiles of at most so many points. `directory` is that of the part.
     ///
     /// # Errors
     /// [`Error::Io`] on its point files, [`Error::Config`] if it would have too many tiles.
-    pub fn partition(self, directory: &JobDirectory) -> Result<Partition> {
+    pub fn partition(self, directory: &JobDirectory, max_points_per_tile: u64) -> Result<Partition> {
         let PointsOfPart { plan, parts, part, .. } = self;
         // Crowded buckets are divided again into a file that no reader writes.
-        let own = parts.all().len() as u16;
+        let (own, selected) = (parts.all().len() as u16, file_of_selected(parts));
         let mut found = directory.point_files()?;
-        found.retain(|(number, _)| *number != own);
+        found.retain(|(number, _)| if self.are_selected { *number == selected } else { *number < own });
         create_folder(directory.points())?;
         let files = PointFiles::open(&found)?.and(PointFile::create(&directory.point_file(own), own)?);
-        let max_points_per_tile = plan.options.triangulation.max_points_per_tile.0;
         let mut builder = TreeBuilder::new(&files, max_points_per_tile, read_buffer_memory(&plan.options));
         let read_bytes: u64 = self.blocks.iter().map(|(_, block)| block.bytes()).sum();
         let mut buckets = vec![Bucket::default(); parts.grid.buckets()];

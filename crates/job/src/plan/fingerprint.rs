@@ -62,7 +62,7 @@ pub struct JobIdentity {
 
 /// Version of the records in the store, of the plan, of the names and bytes of results, and of which nodes merge. It changes with every
 /// change of these, so that no run misreads what another version left, or mixes its results with them.
-pub(crate) const LAYOUT: u32 = 27;
+pub(crate) const LAYOUT: u32 = 28;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -122,6 +122,7 @@ impl Fingerprint {
         }
         // The points' own colours are read only if they are wanted.
         mesh.insert("[output] color".into(), options.output.color.may_be_own().into());
+        mesh.insert("[output] max_error".into(), toml::Value::from(options.output.max_error).to_string().into());
         // So are intensities. Classes are always read.
         mesh.insert("[output] attributes".into(), options.output.attributes.intensity.into());
         Ok(Fingerprint {
@@ -245,7 +246,7 @@ impl Fingerprint {
 
 /// Returns the options that only the style of the tiles depends on. A geoid grid counts by its content: it may lie elsewhere now.
 fn style_of(output: &OutputOptions) -> Result<Map<String, Value>> {
-    let mut style = named_values(output, "output", &["directory"])?;
+    let mut style = named_values(output, "output", &["directory", "max_error"])?;
     if let Some(grid) = output.height_offset.as_ref().and_then(HeightOffset::grid) {
         require_file(grid)?;
         let content = Checksum::of_file(grid).map_err(|e| not_opened(grid, e))?.1;

@@ -13,6 +13,7 @@ use crate::preflight::estimate;
 use crate::preflight::estimate::DiskEstimate;
 use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::preflight::kept_points::{KeptPoints, has_filter};
+use crate::preflight::selection_estimate::estimated_vertices;
 use crate::progress::number_text::{grouped, mebibytes};
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
@@ -27,6 +28,7 @@ use std::path::PathBuf;
 use std::{fmt, io};
 use sys::terminal::one_line;
 use sys::{Error, Result, Warnings, address_space};
+use tiles::options::MaxError;
 
 /// What a job would do.
 #[derive(Clone, Debug, Serialize)]
@@ -37,6 +39,9 @@ pub struct Preflight {
     pub records: u64,
     /// How many points the job keeps at most, as far as headers and a sample of the points tell.
     pub kept: u64,
+    /// About how many of these points `max_error` selects as vertices; `None` without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vertices: Option<u64>,
     /// About how many tiles.
     pub tiles: u64,
     /// About how many columns and rows of the raster, if there is to be one.
@@ -127,6 +132,11 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     if let Some(why) = nothing_will_be_left(&plan)? {
         (preflight.kept, preflight.nothing_is_left) = (0, Some(why.to_string()));
     }
+    if let MaxError::Units(units) = plan.options.output.max_error {
+        let vertices = estimated_vertices(&plan, preflight.kept, &[units])?.first().copied();
+        preflight.vertices = vertices;
+        preflight.tiles = vertices.map_or(preflight.tiles, |vertices| estimate::tiles(&plan, KeptPoints(vertices)));
+    }
     Ok((preflight, plan))
 }
 
@@ -169,6 +179,7 @@ impl Preflight {
             files: plan.inputs.iter().map(|input| describe(&input.source)).collect(),
             records: plan.records,
             kept: kept.0,
+            vertices: None,
             tiles: estimate::tiles(plan, kept),
             raster: planned_raster(plan).map(|grid| grid.size()),
             breaklines: plan.breaklines.as_ref().map(|lines| lines.findings.subsegments),
@@ -275,6 +286,10 @@ impl fmt::Display for Preflight {
         }
         if let Some(edges) = self.breaklines {
             row("breaklines", format!("{} edges", grouped(edges)))?;
+        }
+        if let Some(vertices) = self.vertices {
+            let triangles = grouped(2 * vertices);
+            row("selected", format!("about {} vertices, {triangles} triangles (max_error)", grouped(vertices)))?;
         }
         row("tiles", format!("about {}", grouped(self.tiles)))?;
         if let Some([columns, rows]) = self.raster {

@@ -4,3 +4,4 @@ pub mod check;
 pub mod estimate;
 pub(crate) mod input_places;
 pub(crate) mod kept_points;
+pub mod selection_estimate;

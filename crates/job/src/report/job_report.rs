@@ -12,6 +12,7 @@ use crate::progress::number_text::grouped;
 use crate::progress::stats::StageStats;
 use crate::publish::raster::write_raster::RasterStats;
 use crate::report::breakline_report::BreaklineReport;
+use crate::report::selection_report::SelectionReport;
 use crate::tiles::write_tile::TileStats;
 use delaunay::voronoi::counts::STEP_NAMES;
 use delaunay_gpu::figures::GpuFigures;
@@ -35,6 +36,9 @@ pub struct Report {
     pub generator: String,
     /// Distinct sites in the mesh.
     pub sites: u64,
+    /// How the sites were selected from all points; `None` without `max_error`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub selection: Option<SelectionReport>,
     /// Triangles in all tiles.
     pub triangles: u64,
     /// Triangles that `hull` or `max_edge` left out. They are in `cut`.
@@ -187,6 +191,10 @@ impl PipelineTimes {
 pub struct ReportParts {
     /// What was read.
     pub points: PointCounts,
+    /// How vertices were selected; `None` if all points are.
+    pub selection: Option<SelectionReport>,
+    /// Points that were not selected from, because another has the same x and y.
+    pub duplicates: u64,
     /// The sum over all leaves.
     pub leaves: LeafStats,
     /// The GPU that helped.
@@ -263,6 +271,7 @@ impl Report {
         Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
             sites: parts.leaves.sites,
+            selection: parts.selection,
             triangles: parts.tiles.triangles,
             cut_triangles: parts.tiles.cut_triangles,
             hull_triangles: parts.tiles.slivers,
@@ -271,7 +280,7 @@ impl Report {
             levels: parts.levels,
             raster: parts.raster,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
-            duplicates: parts.leaves.duplicates,
+            duplicates: parts.leaves.duplicates + parts.duplicates,
             files: plan.inputs.len(),
             skipped: plan.skipped.clone(),
             surface: SurfaceShares::of_kept(&parts.points).sentence(plan.options.input.mesh_of()),

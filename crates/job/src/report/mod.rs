@@ -3,6 +3,7 @@
 pub mod breakline_report;
 pub mod job_report;
 pub mod job_status;
+pub mod selection_report;
 pub mod skipped_inputs;
 mod table;
 pub mod task_outcome;

@@ -3,6 +3,7 @@
 use crate::progress::number_text::{grouped, precise_mebibytes};
 use crate::report::breakline_report::BreaklineReport;
 use crate::report::job_report::{Report, SlowestPart, StepSeconds};
+use crate::report::selection_report::SelectionReport;
 use crate::report::skipped_inputs::write_skipped;
 use delaunay::triangulation::TriangulationCounts;
 use delaunay_gpu::figures::GpuFigures;
@@ -67,6 +68,11 @@ impl fmt::Display for Report {
             row("from other machines", format!("{} in {} requests", precise_mebibytes(bytes), grouped(requests)))?;
         }
         row("sites", grouped(self.sites))?;
+        if let Some(SelectionReport { points, max_error, rounds, greatest_error, mean_error, .. }) = &self.selection {
+            let of = format!("of {} points, in {rounds} rounds", grouped(*points));
+            row("  selected (max_error)", format!("{of}, within {max_error}"))?;
+            row("  vertical error", format!("at most {greatest_error:.3}, mean {mean_error:.4}"))?;
+        }
         if let Some(surface) = &self.surface {
             row("surface", surface.clone())?;
         }

@@ -77,7 +77,7 @@ impl<'a> Filling<'a> {
         self.vertices.push(v);
         self.positions.push([x, y, height]);
         self.sites.push([x, y]);
-        insert(&mut self.mesh, &self.sites, SiteIndex::new(self.sites.len() - 1), triangle);
+        insert(&mut self.mesh, &self.sites, SiteIndex::new(self.sites.len() - 1), triangle, |_| {});
         // Flips cross no edge of the boundary, so triangles stay on their side of it.
         self.within.resize(self.mesh.triangles.len(), true);
     }

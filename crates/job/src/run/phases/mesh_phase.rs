@@ -12,7 +12,7 @@ use crate::run::folder::{Folder, once};
 use crate::run::job::Job;
 use crate::run::phases::meshed_part::{MeshedPart, SomeTiles};
 use crate::run::phases::postponed_merges::PostponedMerges;
-use crate::run::phases::read_phase::points_of;
+use crate::run::phases::select_phase::vertices_of;
 use crate::run::phases::tile_queue::{TileAppearance, TileQueue};
 use crate::run::phases::tree_walk::TreeWalk;
 use std::collections::HashSet;
@@ -42,7 +42,8 @@ fn mesh(
     appearance: Option<&Arc<TileAppearance>>,
     others: Option<u64>,
 ) -> Result<MeshedPart> {
-    let partition = points_of(job, part)?.partition(folder.directory)?;
+    let max_points_per_tile = job.plan.options.triangulation.max_points_per_tile.0;
+    let partition = vertices_of(job, part, &folder.store)?.partition(folder.directory, max_points_per_tile)?;
     partition.save(&folder.store)?;
     let MeshInTiles { leaves, tiles, open, stages } = mesh_in_tiles(job, folder, &partition, appearance)?;
     let is_kept = job.plan.keeps_mesh();

@@ -15,6 +15,7 @@ pub(crate) mod plan_phase;
 mod postponed_merges;
 pub(crate) mod publish_phase;
 pub(crate) mod read_phase;
+pub(crate) mod select_phase;
 pub(crate) mod stage_costs;
 pub(crate) mod tile_phase;
 mod tile_queue;
@@ -22,6 +23,7 @@ mod tree_walk;
 mod waiting_tiles;
 
 use crate::Result;
+use crate::index::PartIndex;
 use crate::partition::part_points::ReadInputs;
 use crate::partition::parts::Parts;
 use crate::plan::job_plan::Plan;
@@ -36,6 +38,7 @@ use crate::run::phases::part_store::PartStores;
 use crate::run::phases::plan_phase::settled;
 use crate::run::phases::publish_phase::{publish_job, wants_tileset};
 use crate::run::phases::read_phase::{read_for, sum_up};
+use crate::run::phases::select_phase::{select_vertices, selects};
 use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
 use crate::run::phases::waiting_tiles::WaitingTiles;
 use crate::run::whole_run::WholeRun;
@@ -77,11 +80,23 @@ fn read_and_mesh(job: &Job, stores: &PartStores) -> Result<SitesOfParts> {
     let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
     // Bytes of points that wait, by part.
     let mut waiting = vec![0; job.parts.all().len()];
-    for part in job.parts.all() {
+    let read_next = |part: PartIndex, read: &mut Vec<ReadInputs>, waiting: &mut [u64]| -> Result<()> {
         let malformed = read.iter().map(|inputs| inputs.summary.counts.malformed).sum();
         let inputs = read_for(job, part, malformed)?;
         inputs.by_part.iter().for_each(|found| waiting[found.part.get()] += found.bytes);
         read.push(inputs);
+        Ok(())
+    };
+    let selects = selects(job.plan);
+    if selects {
+        // Any point may decide about any other.
+        job.parts.all().try_for_each(|part| read_next(part, &mut read, &mut waiting))?;
+        select_vertices(job, sum_up(job, read.iter())?.1)?;
+    }
+    for part in job.parts.all() {
+        if !selects {
+            read_next(part, &mut read, &mut waiting)?;
+        }
         let stored = match &front {
             Some(front) => front.stored(),
             None => meshed.iter().map(|part| part.stored).sum::<u64>(),

@@ -10,6 +10,7 @@ use crate::records::{JobStep, JournalEntry, RecordRef};
 use crate::run::done::Done;
 use crate::run::part_entries::{PartHeader, entries_of};
 use crate::run::phases::meshed_part::{MeshedPart, SomeTiles};
+use crate::run::phases::select_phase::SelectedPart;
 use serde::de::{DeserializeOwned, IgnoredAny};
 use sys::Result;
 
@@ -17,6 +18,7 @@ use sys::Result;
 #[derive(Default)]
 pub(crate) struct PartProgress {
     pub(crate) read: Option<ReadInputs>,
+    pub(crate) selected: Option<SelectedPart>,
     pub(crate) mesh: Option<MeshedPart>,
     /// What is written of its tiles.
     pub(crate) tiles: SomeTiles,
@@ -42,6 +44,7 @@ impl PartProgress {
             }
             match entry.step {
                 JobStep::Read => progress.read = Some(figures(&entry)?),
+                JobStep::Select => progress.selected = Some(figures(&entry)?),
                 JobStep::Mesh => progress.mesh = Some(figures(&entry)?),
                 JobStep::Tiles => progress.tiles.add(figures(&entry)?),
                 JobStep::Levels => progress.levels = Some(figures(&entry)?),
@@ -56,6 +59,7 @@ impl PartProgress {
     pub(crate) fn has(&self, phase: Phase) -> bool {
         match phase {
             Phase::Read => self.read.is_some(),
+            Phase::Select => self.selected.is_some(),
             Phase::Mesh => self.mesh.is_some(),
             Phase::Tiles => self.mesh.as_ref().is_some_and(|mesh| mesh.tiles == self.tiles.written.len()),
             Phase::Levels => self.levels.is_some(),
@@ -68,9 +72,9 @@ impl PartProgress {
         self.mesh.as_ref().map_or(0, |mesh| mesh.tiles.saturating_sub(self.tiles.written.len()))
     }
 
-    /// Returns how long the phases took together.
+    /// Returns how long the phases took together that are about this part alone.
     pub(crate) fn seconds(&self) -> f64 {
-        self.costs.iter().map(|(_, done)| done.seconds).sum()
+        self.costs.iter().filter(|(step, _)| *step != JobStep::Select).map(|(_, done)| done.seconds).sum()
     }
 
     /// Returns the largest resident set of the processes that did the phases.

@@ -4,6 +4,7 @@ use crate::Result;
 use crate::durable::directory::JobDirectory;
 use crate::index::PartIndex;
 use crate::mesh::precision_limit::PrecisionLimit;
+use crate::mesh::selection::error_bound;
 use crate::partition::parts::Parts;
 use crate::plan::job_plan::{Claims, Plan, SkippedInput};
 use crate::progress::stage::JobProgress;
@@ -22,6 +23,7 @@ pub(crate) fn settled(run: &WholeRun, mut plan: Plan) -> Result<Plan> {
     if run.journal.figures_of::<()>(JobStep::Plan)?.is_some() {
         return Ok(plan);
     }
+    error_bound(&plan)?;
     let parts = Parts::of(&plan);
     if parts.all().len() == 1 {
         let job = run.job(&plan, &parts);

@@ -18,6 +18,7 @@ use crate::publish::side_files::{EachTile, SideFiles, StoredTiles, write_side_fi
 use crate::publish::tileset_tree::TilesOfTree;
 use crate::records::{JobStep, Store};
 use crate::report::job_report::{Report, ReportParts, SlowestPart};
+use crate::report::selection_report::SelectionReport;
 use crate::run::done::Done;
 use crate::run::folder::Folder;
 use crate::run::job::Job;
@@ -27,6 +28,7 @@ use crate::run::phases::level_phase::{hierarchy_of, left_out_warning, level_size
 use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::part_store::PartStores;
 use crate::run::phases::read_phase::sum_up;
+use crate::run::phases::select_phase::SelectedPart;
 use crate::run::phases::tile_queue::TileAppearance;
 use crate::run::whole_run::WholeRun;
 use crate::tiles::style::TileStyle;
@@ -40,7 +42,7 @@ use sys::{Error, Result, Warnings};
 use tiles::checksums::list_text;
 use tiles::color::Coloring;
 use tiles::frame::Frame;
-use tiles::options::{Hull, OutputFormat};
+use tiles::options::{Hull, MaxError, OutputFormat};
 use tiles::tiles3d::division::divide;
 use tiles::tiles3d::georeference::Georeference;
 use tiles::tiles3d::globe::NotPlaced;
@@ -92,6 +94,8 @@ struct PartFigures {
     /// The points of each part.
     points: Vec<u64>,
     temporary: u64,
+    /// How vertices were selected from the points of all parts.
+    selected: Option<SelectedPart>,
     /// Whether tasks meshed the parts.
     by_tasks: bool,
 }
@@ -116,21 +120,24 @@ impl PartFigures {
         let meshing: u64 = if by_tasks { temporary.sum() } else { temporary.max().unwrap_or(0) };
         // Most tiles may have been written after the last part was meshed.
         let temporary = meshing.max(parts.iter().map(|part| part.stored).sum());
+        let selected = parts.first().and_then(|part| part.selected.clone());
+        let temporary = temporary.max(selected.as_ref().map_or(0, |selected| selected.temporary));
         let points = meshed.iter().map(|mesh| mesh.points).collect();
-        Ok(PartFigures { leaves, tiles, levels, points, temporary, by_tasks })
+        Ok(PartFigures { leaves, tiles, levels, points, temporary, selected, by_tasks })
     }
 }
 
 /// Adds the stages of all parts to the report, in the order of the phases.
 fn add_stages(run: &WholeRun, joined: &JoinedParts, parts: &[PartProgress]) {
     let of = |step| parts.iter().flat_map(move |part| part.stages_of(step)).cloned();
-    let first = of(JobStep::Read).chain(of(JobStep::Mesh)).chain(joined.stages.iter().cloned());
+    let first =
+        of(JobStep::Read).chain(of(JobStep::Select)).chain(of(JobStep::Mesh)).chain(joined.stages.iter().cloned());
     first.chain(of(JobStep::Tiles)).chain(of(JobStep::Levels)).for_each(|stage| run.add_stage(stage));
 }
 
 /// Returns the seconds of processor time of all phases of parts. The stages of meshing are kinds of work that go on at the same time.
 fn processor_seconds(parts: &[PartProgress]) -> f64 {
-    let steps = [JobStep::Read, JobStep::Mesh, JobStep::Tiles, JobStep::Levels];
+    let steps = [JobStep::Read, JobStep::Select, JobStep::Mesh, JobStep::Tiles, JobStep::Levels];
     let stages =
         |part: &PartProgress| steps.iter().flat_map(|&step| part.stages_of(step)).map(|stage| stage.cpu_s).sum::<f64>();
     parts.iter().map(stages).sum()
@@ -362,7 +369,13 @@ fn write_report(
     published: Published,
 ) -> Result<Report> {
     let list = write_file_list(run)?;
+    let selection = match (&figures.selected, job.plan.options.output.max_error) {
+        (Some(selected), MaxError::Units(bound)) => Some(SelectionReport::new(job.plan, bound, &selected.all)),
+        _ => None,
+    };
     let parts = ReportParts {
+        selection,
+        duplicates: figures.selected.as_ref().map_or(0, |selected| selected.duplicates),
         parts: job.parts.all().len() as u64,
         slowest_part: costs.slowest,
         peak_memory: costs.peak_memory,

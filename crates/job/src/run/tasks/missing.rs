@@ -55,6 +55,7 @@ impl<'a> JobProgressByPart<'a> {
     pub(crate) fn is_done(&self, phase: Phase) -> bool {
         match phase {
             Phase::Plan => true,
+            Phase::Select => self.parts.iter().all(|part| part.selected.is_some()),
             Phase::Join => self.is_joined,
             _ => false,
         }
@@ -122,7 +123,11 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
     let directory = JobDirectory::new(&options.output.directory);
     if let InPlace::ThisJob(_) = in_place(&directory, options, 0)? {
         let has_rest = is_rest(&directory)?;
-        return Ok(of_each(tasks, |phase| if phase == Phase::Publish && has_rest { vec![1] } else { Vec::new() }));
+        return Ok(of_each(
+            options,
+            tasks,
+            |phase| if phase == Phase::Publish && has_rest { vec![1] } else { Vec::new() },
+        ));
     }
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
     let known = planned(&directory, 0)?;
@@ -131,7 +136,7 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
     if is_same && PlannedJob::open(&directory, options, 0)?.is_some() {
         missing_tasks_of_planned(options, tasks)
     } else {
-        Ok(PhaseTasks::all(tasks))
+        Ok(PhaseTasks::all(tasks, options.output.selects()))
     }
 }
 
@@ -141,19 +146,20 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
 /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the job directory.
 pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     let directory = JobDirectory::new(&options.output.directory);
-    let only_publish = || of_each(tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() });
+    let only_publish = || of_each(options, tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() });
     if single_process::is_noted(&directory, 0)? {
         return Ok(only_publish());
     }
     match PlannedJob::open(&directory, options, 0)? {
         Some(job) if !job.is_complete => {
             let progress = JobProgressByPart::of(&job)?;
-            Ok(of_each(tasks, |phase| progress.missing_tasks(phase, tasks)))
+            Ok(of_each(options, tasks, |phase| progress.missing_tasks(phase, tasks)))
         }
         _ => Ok(only_publish()),
     }
 }
 
-fn of_each(tasks: u32, missing: impl Fn(Phase) -> Vec<u32>) -> Vec<PhaseTasks> {
-    Phase::ALL.map(|phase| PhaseTasks { phase, count: phase.tasks(tasks), missing: missing(phase) }).to_vec()
+fn of_each(options: &JobOptions, tasks: u32, missing: impl Fn(Phase) -> Vec<u32>) -> Vec<PhaseTasks> {
+    let of_phase = |phase: Phase| PhaseTasks { phase, count: phase.tasks(tasks), missing: missing(phase) };
+    Phase::of_job(options.output.selects()).map(of_phase).collect()
 }

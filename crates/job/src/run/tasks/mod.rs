@@ -63,7 +63,8 @@ fn publish(directory: &JobDirectory, options: &JobOptions, run: RunOptions, task
         let job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
         if !job.is_complete {
             let progress = JobProgressByPart::of(&job)?;
-            Phase::ALL[..6].iter().try_for_each(|&phase| progress.require(phase, task.count, |_| true))?;
+            let mut before = Phase::of_job(options.output.selects()).filter(|phase| *phase != Phase::Publish);
+            before.try_for_each(|phase| progress.require(phase, task.count, |_| true))?;
         }
     }
     run_until_it_fits(options, run, is_by_tasks)

@@ -19,6 +19,7 @@ use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::part_store::PartStores;
 use crate::run::phases::publish_phase::wants_tileset;
 use crate::run::phases::read_phase::{read_for, sum_up};
+use crate::run::phases::select_phase::{select_vertices, selects};
 use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
 use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
@@ -105,7 +106,9 @@ impl PartTask<'_> {
         let options = &self.job.plan.options;
         let threads = rayon::current_num_threads();
         let triangulator = match self.phase {
-            Phase::Mesh => Triangulator::new(&options.triangulation, &options.gpu, options.limits.memory.0)?,
+            Phase::Mesh | Phase::Select => {
+                Triangulator::new(&options.triangulation, &options.gpu, options.limits.memory.0)?
+            }
             _ => Triangulator::without_gpu(&options.triangulation),
         };
         triangulator.prepare(mine.iter().map(|&part| self.job.parts.expected_points(part)).sum(), threads);
@@ -123,6 +126,7 @@ impl PartTask<'_> {
         };
         match self.phase {
             Phase::Read => self.each(mine, |part| read_for(job, part, 0).map(|_| ())),
+            Phase::Select => self.select(job),
             Phase::Mesh => self.mesh(job, mine),
             Phase::Join => self.join(job),
             Phase::Tiles => self.tiles(job, mine),
@@ -146,10 +150,22 @@ impl PartTask<'_> {
         in_use.map_or(Ok(()), Err)
     }
 
+    fn select(&self, job: &Job) -> Result<()> {
+        let progress = JobProgressByPart::of(self.job)?;
+        progress.require(Phase::Read, self.task.count, |_| true)?;
+        let (_, bounds) = sum_up(job, progress.parts.iter().filter_map(|part| part.read.as_ref()))?;
+        select_vertices(job, bounds)
+    }
+
     fn mesh(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
         let readers: Vec<PartIndex> = mine.iter().flat_map(|&part| job.parts.readers_of(part)).collect();
         let is_reader = |part: PartIndex| readers.contains(&part);
-        JobProgressByPart::of_parts(self.job, is_reader)?.require(Phase::Read, self.task.count, is_reader)?;
+        if selects(job.plan) {
+            // Of all parts: until then, the points of each are needed.
+            JobProgressByPart::of(self.job)?.require(Phase::Select, self.task.count, |_| true)?;
+        } else {
+            JobProgressByPart::of_parts(self.job, is_reader)?.require(Phase::Read, self.task.count, is_reader)?;
+        }
         let appearance = early_appearance(job)?;
         self.each(mine, |part| mesh_one(job, part, appearance.as_ref(), None).map(|_| ()))
     }

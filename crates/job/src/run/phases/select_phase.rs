@@ -1,0 +1,106 @@
+//! Selecting the points that are vertices, of jobs with `[output] max_error`. All parts are read before, and none is meshed.
+
+use crate::durable::directory::JobDirectory;
+use crate::index::PartIndex;
+use crate::mesh::selection::{PartInBlocks, PointsInBlocks, error_bound, points_per_block};
+use crate::partition::part_points::{PointsOfPart, file_of_selected};
+use crate::plan::budget::working_memory;
+use crate::plan::job_plan::Plan;
+use crate::records::{JobStep, StepRecord, Store};
+use crate::run::done::Done;
+use crate::run::folder::Folder;
+use crate::run::job::Job;
+use crate::run::part_entries::entries_of;
+use crate::run::phases::read_phase::points_of;
+use crate::{Error, Result};
+use delaunay::geometry::Bounds;
+use selection::{Figures, Selection, select};
+use serde::{Deserialize, Serialize};
+
+/// What is known of a part once its vertices are selected.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct SelectedPart {
+    /// The figures of the selection of all parts.
+    pub(crate) all: Figures,
+    /// Points of all parts of which another has the same x and y.
+    pub(crate) duplicates: u64,
+    /// Bytes of all points, and of those that were found when the part was done.
+    pub(crate) temporary: u64,
+    /// The number of blocks that the selected points of this part are in.
+    blocks: u64,
+}
+
+/// Tells whether the job has the phase.
+pub(crate) fn selects(plan: &Plan) -> bool {
+    plan.options.output.selects()
+}
+
+/// Selects the vertices of all parts, unless that is done. All points lie in `bounds`.
+///
+/// # Errors
+/// [`Error::DamagedSteps`] if points are damaged; [`sys::Error::Io`] on the folders of the parts; [`Error::InUse`] if another process has one;
+/// [`sys::Error::Config`] if the memory does not hold the selection.
+pub(crate) fn select_vertices(job: &Job, bounds: Bounds<3>) -> Result<()> {
+    let Some(bound) = error_bound(job.plan)? else { return Ok(()) };
+    let is_done = |part| {
+        Ok(entries_of(&job.directory.part(part), job.header(part))?.iter().any(|entry| entry.step == JobStep::Select))
+    };
+    if job.parts.all().map(is_done).collect::<sys::Result<Vec<bool>>>()?.into_iter().all(|is_done| is_done) {
+        return Ok(());
+    }
+    let directories: Vec<JobDirectory> = job.parts.all().map(|part| job.directory.part(part)).collect();
+    // The lock of the first part is that of the phase: no other phase goes on before this one is done.
+    let first = Folder::open(job, &directories[0], PartIndex::FIRST)?;
+    let stage = job.progress.stage("select", job.plan.decoded_records(), "points");
+    let memory = working_memory(&job.plan.options);
+    let per_block = points_per_block(job.plan.decoded_records(), memory, job.threads);
+    let in_blocks = |part: PartIndex| {
+        let directory = &directories[part.get()];
+        let partition = points_of(job, part)?.partition(directory, per_block)?;
+        let mut files = directory.point_files()?;
+        files.retain(|(number, _)| *number != file_of_selected(job.parts));
+        Ok(PartInBlocks { part, partition, files })
+    };
+    let parts = job.parts.all().map(in_blocks).collect::<Result<Vec<PartInBlocks>>>()?;
+    let source = PointsInBlocks::new(job.plan, job.triangulator, &parts);
+    let Bounds { min, max } = bounds;
+    let bounds = Bounds { min: [min[0], min[1]], max: [max[0], max[1]] };
+    let Selection { sites, figures } = select(&source, bounds, source.points(), bound)?;
+    let duplicates = source.points() - figures.points;
+    stage.advance(source.points());
+    let mut stages = vec![stage.finish()];
+    let mut temporary = parts.iter().map(|part| part.partition.point_bytes).sum();
+    for (number, PartInBlocks { part, .. }) in parts.iter().enumerate() {
+        let other = if number == 0 { None } else { Some(Folder::open(job, &directories[number], *part)?) };
+        let folder = other.as_ref().unwrap_or(&first);
+        if folder.done::<SelectedPart>(JobStep::Select)?.is_some() {
+            continue;
+        }
+        let blocks = source.write_selected(number, &sites, job.parts, &directories[number], job.syncs())?;
+        blocks.save_as(&folder.store, StepRecord::Selected)?;
+        temporary += blocks.bytes();
+        let selected = SelectedPart { all: figures, duplicates, temporary, blocks: blocks.len() };
+        folder.record(JobStep::Select, selected, std::mem::take(&mut stages))?;
+    }
+    Ok(())
+}
+
+/// Returns the points of a part that are vertices: all, or those that are selected. `store` is that of the part.
+///
+/// # Errors
+/// Those of [`points_of`]; [`Error::TooEarly`] if they are not selected.
+pub(crate) fn vertices_of<'a>(job: &Job<'a>, part: PartIndex, store: &Store) -> Result<PointsOfPart<'a>> {
+    if !selects(job.plan) {
+        return points_of(job, part);
+    }
+    let directory = &job.directory.part(part);
+    let entries = entries_of(directory, job.header(part))?;
+    let entry = entries.iter().find(|entry| entry.step == JobStep::Select);
+    let entry = entry.ok_or_else(|| sys::Error::Broken(format!("the vertices of part {part} are not selected")))?;
+    let blocks = entry.figures::<Done<SelectedPart>>()?.figures.blocks;
+    let points = PointsOfPart::none(job.plan, job.parts, part).selected(store, blocks)?;
+    if job.checks_points && !points.are_whole(directory)? {
+        return Err(Error::DamagedSteps);
+    }
+    Ok(points)
+}

@@ -1,0 +1,47 @@
+//! The corners of the convex hull.
+
+use delaunay::geometry::Site;
+use delaunay::geometry::predicates::orient2d;
+
+/// Returns the corners of the convex hull of `points` with their heights, counterclockwise (Andrew's monotone chain). Points on its edges are
+/// none. Of points on a line these are the two ends.
+pub(crate) fn hull_corners(mut points: Vec<[i32; 3]>) -> Vec<[i32; 3]> {
+    points.sort_unstable();
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let mut hull = chain(points.iter());
+    hull.extend(chain(points.iter().rev()));
+    hull
+}
+
+/// Returns the chain that turns left from the first point to the last, without the last.
+fn chain<'a>(points: impl Iterator<Item = &'a [i32; 3]>) -> Vec<[i32; 3]> {
+    let site = |p: [i32; 3]| -> Site { [p[0], p[1]] };
+    let mut chain: Vec<[i32; 3]> = Vec::new();
+    for &point in points {
+        while let [.., before, last] = chain[..]
+            && orient2d(site(before), site(last), site(point)) <= 0
+        {
+            chain.pop();
+        }
+        chain.push(point);
+    }
+    chain.pop();
+    chain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_corners_are_on_the_hull() {
+        let square: Vec<[i32; 3]> = (0..25).map(|i| [i % 5, i / 5, i]).collect();
+        assert_eq!(hull_corners(square), [[0, 0, 0], [4, 0, 4], [4, 4, 24], [0, 4, 20]]);
+        let line: Vec<[i32; 3]> = (0..5).map(|i| [i, 2 * i, 0]).collect();
+        assert_eq!(hull_corners(line), [[0, 0, 0], [4, 8, 0]]);
+        assert_eq!(hull_corners(vec![[7, 7, 7]]), [[7, 7, 7]]);
+    }
+}

@@ -1,0 +1,29 @@
+//! Error-bounded selection: few points of a cloud, so that every point is within a bound of their Delaunay triangulation, along the vertical.
+//!
+//! It is greedy insertion (Garland and Heckbert 1995, "Fast Polygonal Approximation of Terrains and Height Fields") in rounds. A round
+//! triangulates what is selected, and selects the worst points of the triangles where they exceed the bound, but for those that a worse one beside
+//! them may make superfluous (`rounds.rs`).
+//!
+//! The canonical triangulation of a set of sites is unique, a round looks at nothing but a triangle and the points in it, and all of its points
+//! join at once. So the selection depends on the points, with those that repeat others, and the bound alone, not on how the points are divided into blocks, on
+//! threads or on the machine. All decisions are exact, in integers.
+
+#![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
+
+mod block;
+mod error_bound;
+mod hull;
+mod regions;
+mod rounds;
+mod seeds;
+mod select;
+mod selected_sites;
+mod source;
+#[cfg(test)]
+mod tests;
+
+pub use error_bound::{ErrorBound, VerticalError};
+pub use rounds::{Figures, Selection};
+pub use select::select;
+pub use selected_sites::SelectedSites;
+pub use source::{BYTES_PER_LISTED, BYTES_PER_POINT, BYTES_PER_SELECTED, BlockPoints, PointSource};

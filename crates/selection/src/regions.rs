@@ -1,0 +1,121 @@
+//! Clouds of many points: each region of the plane by itself, and then all together.
+//!
+//! Every round of a whole cloud reads all of it, if the memory does not hold it. So points are selected from each region as if it were a cloud
+//! of its own. After that only triangles across the borders of regions have points that exceed the bound, and few rounds are left.
+//!
+//! Regions are cells of the lattice, and how large they are depends on the number of the points and their box alone. So does the result.
+
+use crate::rounds::BlockState;
+use crate::seeds::LatticeCells;
+use crate::source::{BlockPoints, PointSource};
+use delaunay::geometry::{Bounds, Site};
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// How clouds are divided.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RegionSizes {
+    /// Clouds of at most so many points are not: at least 16 times as many as a region has, so that a region is a part of them.
+    pub(crate) undivided: u64,
+    /// A region has at least so many points on average, and less than four times as many.
+    pub(crate) points: u64,
+}
+
+impl RegionSizes {
+    /// The sizes of all jobs. Points at the borders of regions are superfluous in the end: with regions of a million to four million points,
+    /// some percent of the vertices. A region takes some hundred megabytes.
+    pub(crate) const USUAL: RegionSizes = RegionSizes { undivided: 1 << 24, points: 1 << 20 };
+}
+
+/// A cloud in regions.
+pub(crate) struct Division<'a, E> {
+    /// What is known of all blocks of the cloud.
+    pub(crate) blocks: Vec<BlockState>,
+    /// The regions that have points.
+    pub(crate) regions: Vec<Region<'a, E>>,
+}
+
+/// What a block has in a region.
+#[derive(Clone, Copy)]
+struct Share {
+    points: u64,
+    bounds: Bounds<2>,
+}
+
+/// Divides a cloud, which has `points` points in `bounds`.
+///
+/// # Errors
+/// Those of `source`.
+pub(crate) fn divide<E: Send>(
+    source: &dyn PointSource<Error = E>,
+    bounds: Bounds<2>,
+    points: u64,
+    sizes: RegionSizes,
+) -> Result<Division<'_, E>, E> {
+    let cells = LatticeCells::new(bounds, points, sizes.points);
+    let share = |block| {
+        let points = source.load(block)?.points;
+        let mut shares = BTreeMap::<[i32; 2], Share>::new();
+        for &[x, y, _] in &points {
+            let share = shares.entry(cells.of(x, y)).or_insert(Share { points: 0, bounds: Bounds::of_point([x, y]) });
+            share.points += 1;
+            share.bounds.include([x, y]);
+        }
+        Ok((BlockState::of(&points), shares))
+    };
+    let found = (0..source.blocks()).into_par_iter().with_max_len(1).map(share).collect::<Result<Vec<_>, E>>()?;
+    let mut regions = BTreeMap::<[i32; 2], (Share, Vec<usize>)>::new();
+    let mut blocks = Vec::with_capacity(found.len());
+    for (block, (state, shares)) in found.into_iter().enumerate() {
+        blocks.push(state);
+        for (cell, share) in shares {
+            let (sum, of_region) = regions.entry(cell).or_insert((Share { points: 0, ..share }, Vec::new()));
+            *sum = Share { points: sum.points + share.points, bounds: sum.bounds.union(share.bounds) };
+            of_region.push(block);
+        }
+    }
+    let region = |(cell, (Share { points, bounds }, blocks))| Region { source, cells, cell, blocks, points, bounds };
+    Ok(Division { blocks, regions: regions.into_iter().map(region).collect() })
+}
+
+/// The points of a cloud that lie in a cell of the lattice.
+pub(crate) struct Region<'a, E> {
+    source: &'a dyn PointSource<Error = E>,
+    cells: LatticeCells,
+    cell: [i32; 2],
+    /// The blocks that have some.
+    blocks: Vec<usize>,
+    /// How many there are.
+    pub(crate) points: u64,
+    /// The box of them.
+    pub(crate) bounds: Bounds<2>,
+}
+
+impl<E: Send> PointSource for Region<'_, E> {
+    type Error = E;
+
+    fn blocks(&self) -> usize {
+        self.blocks.len()
+    }
+
+    fn load(&self, block: usize) -> Result<BlockPoints, E> {
+        let BlockPoints { mut points, mut fixed } = self.source.load(self.blocks[block])?;
+        let is_here = |&[x, y, _]: &[i32; 3]| self.cells.of(x, y) == self.cell;
+        points.retain(is_here);
+        fixed.retain(is_here);
+        Ok(BlockPoints { points, fixed })
+    }
+
+    fn triangulate(&self, sites: &[Site]) -> Result<HalfEdgeMesh, E> {
+        self.source.triangulate(sites)
+    }
+
+    fn keeps_blocks(&self, points: u64, selected: u64) -> bool {
+        self.source.keeps_blocks(points, selected)
+    }
+
+    fn after_round(&self, round: u32, selected: u64) -> Result<(), E> {
+        self.source.after_round(round, selected)
+    }
+}

@@ -1,0 +1,94 @@
+//! What the first round triangulates: the corners of the hull of all points, and of each cell of a square grid the point nearest to its middle.
+
+use crate::hull::hull_corners;
+use delaunay::geometry::Bounds;
+use std::collections::HashMap;
+
+/// A cell has so many points, more or less. With fewer, seeds are a burden where few points are wanted in the end; with more, the first rounds
+/// take longer.
+const POINTS_PER_CELL: u64 = 16_000;
+
+/// Square cells of the lattice whose sides are a power of two steps, and which have so many points on average.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct LatticeCells {
+    shift: u32,
+}
+
+impl LatticeCells {
+    /// Returns the smallest cells that hold `wanted` of the `points` in `bounds` on average.
+    pub(crate) fn new(bounds: Bounds<2>, points: u64, wanted: u64) -> LatticeCells {
+        let area = (bounds.extent(0) + 1) as u128 * (bounds.extent(1) + 1) as u128;
+        let is_enough = |shift: &u32| u128::from(points) << (2 * shift) >= u128::from(wanted) * area;
+        LatticeCells { shift: (0..30).find(is_enough).unwrap_or(30) }
+    }
+
+    /// Returns the column and the row of the cell that `x` and `y` are in.
+    pub(crate) fn of(self, x: i32, y: i32) -> [i32; 2] {
+        [x >> self.shift, y >> self.shift]
+    }
+
+    /// Returns the side of a cell.
+    pub(crate) fn side(self) -> i64 {
+        1 << self.shift
+    }
+
+    /// Returns the square of the distance of a point from the middle of its cell.
+    fn distance_from_middle(self, point: [i32; 3]) -> i64 {
+        let along = |value: i32| i64::from(value) - ((i64::from(value >> self.shift) << self.shift) + self.side() / 2);
+        along(point[0]).pow(2) + along(point[1]).pow(2)
+    }
+}
+
+/// Seeds of a block, or of several.
+#[derive(Clone, Debug)]
+pub(crate) struct Seeds {
+    cells: LatticeCells,
+    hull: Vec<[i32; 3]>,
+    by_cell: HashMap<[i32; 2], [i32; 3]>,
+    fixed: Vec<[i32; 3]>,
+}
+
+impl Seeds {
+    /// Returns no seeds for `points` points in `bounds`.
+    pub(crate) fn none(bounds: Bounds<2>, points: u64) -> Seeds {
+        let cells = LatticeCells::new(bounds, points, POINTS_PER_CELL);
+        Seeds { cells, hull: Vec::new(), by_cell: HashMap::new(), fixed: Vec::new() }
+    }
+
+    /// Adds the points of a block, of which those that are `fixed` are seeds in any case.
+    pub(crate) fn add(&mut self, points: &[[i32; 3]], fixed: &[[i32; 3]]) {
+        for &point in points {
+            self.offer(point);
+        }
+        self.hull = hull_corners(points.iter().chain(&self.hull).copied().collect());
+        self.fixed.extend(fixed);
+    }
+
+    fn offer(&mut self, point: [i32; 3]) {
+        let cells = self.cells;
+        let rank = |p: [i32; 3]| (cells.distance_from_middle(p), p);
+        let nearest = self.by_cell.entry(cells.of(point[0], point[1])).or_insert(point);
+        *nearest = [*nearest, point].into_iter().min_by_key(|&p| rank(p)).unwrap_or(point);
+    }
+
+    /// Adds the seeds of other blocks.
+    pub(crate) fn join(mut self, other: Seeds) -> Seeds {
+        other.by_cell.into_values().for_each(|point| self.offer(point));
+        self.hull = hull_corners([self.hull, other.hull].concat());
+        self.fixed.extend(other.fixed);
+        self
+    }
+
+    /// Returns the corners of the hull.
+    pub(crate) fn hull(&self) -> &[[i32; 3]] {
+        &self.hull
+    }
+
+    /// Returns all seeds once, in order.
+    pub(crate) fn into_points(self) -> Vec<[i32; 3]> {
+        let mut all: Vec<[i32; 3]> = self.by_cell.into_values().chain(self.hull).chain(self.fixed).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+}

@@ -1,0 +1,62 @@
+//! Selecting points from a cloud, or from its regions first.
+
+use crate::error_bound::ErrorBound;
+use crate::hull::hull_corners;
+use crate::regions::{Division, RegionSizes, divide};
+use crate::rounds::{BlockState, Rounds, Selection};
+use crate::seeds::Seeds;
+use crate::source::{BlockPoints, PointSource};
+use delaunay::geometry::Bounds;
+use rayon::prelude::*;
+
+/// Selects points from the blocks of `source` until every point is within `bound` of the triangulation of the selected ones. All `points`
+/// points lie in `bounds`.
+///
+/// Of points on one line all are selected: there is no triangle.
+///
+/// # Errors
+/// Those of `source`.
+pub fn select<S: PointSource>(
+    source: &S,
+    bounds: Bounds<2>,
+    points: u64,
+    bound: ErrorBound,
+) -> Result<Selection, S::Error> {
+    select_by_regions(source, bounds, points, bound, RegionSizes::USUAL)
+}
+
+/// As [`select`]. A cloud of many points is divided into regions by the lattice, and points are selected from each of these by itself first.
+pub(crate) fn select_by_regions<E: Send>(
+    source: &dyn PointSource<Error = E>,
+    bounds: Bounds<2>,
+    points: u64,
+    bound: ErrorBound,
+    sizes: RegionSizes,
+) -> Result<Selection, E> {
+    let mut rounds = Rounds::new(source, bounds, points);
+    if points > sizes.undivided {
+        let Division { blocks, regions } = divide(source, bounds, points, sizes)?;
+        let (mut selected, mut most) = (Vec::new(), 0);
+        for region in &regions {
+            let of_region = select_by_regions(region, region.bounds, region.points, bound, sizes)?;
+            most = most.max(of_region.figures.rounds);
+            selected.extend(of_region.sites.within(region.bounds));
+            source.after_round(most, selected.len() as u64)?;
+        }
+        rounds.begin(blocks, hull_corners(selected.clone()), selected, most);
+    } else {
+        let seed = |block| {
+            let BlockPoints { points: of_block, fixed } = source.load(block)?;
+            let mut seeds = Seeds::none(bounds, points);
+            seeds.add(&of_block, &fixed);
+            Ok((seeds, BlockState::of(&of_block)))
+        };
+        let found: Vec<(Seeds, BlockState)> =
+            (0..source.blocks()).into_par_iter().with_max_len(1).map(seed).collect::<Result<_, E>>()?;
+        let (seeds, blocks): (Vec<Seeds>, Vec<BlockState>) = found.into_iter().unzip();
+        let seeds = seeds.into_iter().fold(Seeds::none(bounds, points), Seeds::join);
+        let outline = seeds.hull().to_vec();
+        rounds.begin(blocks, outline, seeds.into_points(), 0);
+    }
+    rounds.run(bound)
+}

@@ -1,0 +1,256 @@
+//! Selections compared with the plainest way to them.
+
+use crate::*;
+use delaunay::geometry::predicates::orient2d;
+use delaunay::geometry::{Bounds, Site};
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::triangulation::canonical;
+use proptest::prelude::*;
+use std::collections::BTreeSet;
+
+/// A cloud cut into blocks of equal columns and rows.
+struct Cloud {
+    blocks: Vec<BlockPoints>,
+    keeps_blocks: bool,
+}
+
+impl Cloud {
+    fn new(points: &[[i32; 3]], fixed: &[[i32; 3]], side: i32, keeps_blocks: bool) -> Cloud {
+        let mut blocks = std::collections::BTreeMap::<[i32; 2], BlockPoints>::new();
+        let cell = |p: &[i32; 3]| [p[0].div_euclid(side), p[1].div_euclid(side)];
+        points.iter().for_each(|p| blocks.entry(cell(p)).or_default().points.push(*p));
+        fixed.iter().for_each(|p| blocks.entry(cell(p)).or_default().fixed.push(*p));
+        Cloud { blocks: blocks.into_values().collect(), keeps_blocks }
+    }
+}
+
+impl PointSource for Cloud {
+    type Error = delaunay::Error;
+
+    fn blocks(&self) -> usize {
+        self.blocks.len()
+    }
+
+    fn load(&self, block: usize) -> Result<BlockPoints, delaunay::Error> {
+        Ok(self.blocks[block].clone())
+    }
+
+    fn triangulate(&self, sites: &[Site]) -> Result<HalfEdgeMesh, delaunay::Error> {
+        canonical(sites)
+    }
+
+    fn keeps_blocks(&self, _: u64, _: u64) -> bool {
+        self.keeps_blocks
+    }
+
+    fn after_round(&self, _: u32, _: u64) -> Result<(), delaunay::Error> {
+        Ok(())
+    }
+}
+
+fn bounds_of(points: &[[i32; 3]]) -> Bounds<2> {
+    Bounds::of_points(points.iter().map(|p| [p[0], p[1]])).unwrap()
+}
+
+fn selected(
+    points: &[[i32; 3]],
+    fixed: &[[i32; 3]],
+    side: i32,
+    bound: ErrorBound,
+    keeps: bool,
+) -> (Vec<[i32; 3]>, Figures) {
+    let bounds = bounds_of(points);
+    let Selection { sites, figures } =
+        select(&Cloud::new(points, fixed, side, keeps), bounds, points.len() as u64, bound).unwrap();
+    let mut all: Vec<_> = sites.within(bounds).collect();
+    all.sort_unstable();
+    (all, figures)
+}
+
+/// Does rounds on all points at once, each from nothing, from these seeds on.
+fn plain_rounds(points: &[[i32; 3]], seeds: Vec<[i32; 3]>, bound: ErrorBound) -> Vec<[i32; 3]> {
+    let mut selected: BTreeSet<[i32; 3]> = seeds.into_iter().collect();
+    loop {
+        let worst = worst_points(points, &selected, bound);
+        let beside = |a: &[[i32; 3]; 3], b: &[[i32; 3]; 3]| a.iter().filter(|corner| b.contains(corner)).count() == 2;
+        let rank = |(error, p): (u64, [i32; 3])| (error, std::cmp::Reverse(p));
+        let accepted = worst.iter().filter(|(triangle, own)| {
+            let is_outdone_by =
+                |(other, candidate): &WorstPoint| beside(triangle, other) && rank(*candidate) > rank(*own);
+            own.0 > 4 * bound.fixed() || !worst.iter().any(is_outdone_by)
+        });
+        let accepted: Vec<[i32; 3]> = accepted.map(|(_, (_, p))| *p).collect();
+        if accepted.is_empty() {
+            return selected.into_iter().collect();
+        }
+        selected.extend(accepted);
+    }
+}
+
+/// A triangle, the distance of its worst point, and that point.
+type WorstPoint = ([[i32; 3]; 3], (u64, [i32; 3]));
+
+/// Returns the worst point of each triangle where it exceeds the bound.
+fn worst_points(points: &[[i32; 3]], selected: &BTreeSet<[i32; 3]>, bound: ErrorBound) -> Vec<WorstPoint> {
+    let all: Vec<[i32; 3]> = selected.iter().copied().collect();
+    let sites: Vec<Site> = all.iter().map(|p| [p[0], p[1]]).collect();
+    let mesh = canonical(&sites).unwrap();
+    let triangles = mesh.corners().iter().map(|t| t.map(|v| all[v as usize]));
+    let worst = triangles.filter_map(|triangle| {
+        let candidates = points.iter().filter(|p| !selected.contains(*p) && owns(triangle, **p));
+        let worst = candidates.map(|&p| (VerticalError::of(triangle, p), p));
+        let worst = worst.max_by_key(|(error, p)| (error.numerator, std::cmp::Reverse(*p)));
+        worst.filter(|(error, _)| bound.is_exceeded_by(*error)).map(|(error, p)| (triangle, (error.fixed().max(1), p)))
+    });
+    worst.collect()
+}
+
+/// A point on an edge belongs to the triangle on the left of it, as seen from the lesser end. Those on the hull are left out here.
+fn owns(triangle: [[i32; 3]; 3], p: [i32; 3]) -> bool {
+    let site = |p: [i32; 3]| [p[0], p[1]];
+    (0..3).all(|k| {
+        let (from, to) = (site(triangle[k]), site(triangle[(k + 1) % 3]));
+        let side = orient2d(from, to, site(p));
+        side > 0 || side == 0 && from < to
+    })
+}
+
+/// Points of distinct places within `reach`, without any on the outline but corners, whose heights come from `height`.
+fn cloud(reach: i32, places: Vec<(i32, i32)>, height: impl Fn(i32, i32) -> i32) -> Vec<[i32; 3]> {
+    let mut all: BTreeSet<[i32; 2]> =
+        places.into_iter().map(|(x, y)| [1 + x % (reach - 1), 1 + y % (reach - 1)]).collect();
+    all.extend([[0, 0], [reach, 0], [0, reach], [reach, reach]]);
+    all.into_iter().map(|[x, y]| [x, y, height(x, y)]).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    /// Few places: many points on edges and circles, and many ties of distances.
+    #[test]
+    fn a_selection_is_that_of_plain_rounds_whatever_the_blocks(
+        reach in prop::sample::select(vec![6, 13, 40, 5000]),
+        places in prop::collection::vec((0..5000i32, 0..5000i32), 1..220),
+        shape in 0..6,
+        bound in prop::sample::select(vec![(0u64, 1u32), (1, 3), (1, 1), (5, 2), (40, 1)]),
+        side in prop::sample::select(vec![3, 7, 17, 701, 2500, 100_000]),
+    ) {
+        let side = side.max(reach / 12);
+        let points = cloud(reach, places, |x, y| match shape {
+            0 => x * 31 % 17,
+            1 => if x > reach / 2 { 50 } else { 0 },
+            2 => (x - reach / 2).abs().min(20) + y % 2,
+            3 => x + 2 * y,
+            4 => (x * x + y * y) / (reach * reach / 90).max(1),
+            _ => (x / 3 * 7 + y / 2 * 3) % 11,
+        });
+        let bound = ErrorBound::new(bound.0, bound.1);
+        let (found, figures) = selected(&points, &[], side, bound, true);
+        let (again, _) = selected(&points, &[], 100_000, bound, false);
+        prop_assert_eq!(&found, &again);
+        prop_assert_eq!(found.len() as u64, figures.selected);
+        // Every point is within the bound.
+        let chosen: BTreeSet<_> = found.iter().copied().collect();
+        prop_assert_eq!(worst_points(&points, &chosen, bound), Vec::new());
+        // Round by round the plain way.
+        let mut seeds = crate::seeds::Seeds::none(bounds_of(&points), points.len() as u64);
+        seeds.add(&points, &[]);
+        prop_assert_eq!(found, plain_rounds(&points, seeds.into_points(), bound));
+    }
+}
+
+#[test]
+fn a_plane_takes_its_corners_and_a_line_all_points() {
+    let plane: Vec<[i32; 3]> = (0..10_000).map(|i| [i % 100, i / 100, 3 * (i % 100) - 2 * (i / 100)]).collect();
+    let (found, figures) = selected(&plane, &[], 30, ErrorBound::new(0, 1), true);
+    assert!(found.len() <= 4 + 16, "{}", found.len());
+    assert_eq!((figures.greatest, figures.rounds, figures.points), (0, 0, 10_000));
+    let line: Vec<[i32; 3]> = (0..100).map(|i| [i, 2 * i, i % 7]).collect();
+    assert_eq!(selected(&line, &[], 30, ErrorBound::new(1, 1), true).0, line);
+}
+
+#[test]
+fn fixed_points_are_selected() {
+    let plane: Vec<[i32; 3]> = (0..400).map(|i| [i % 20, i / 20, 0]).collect();
+    let fixed = [[7, 8, 0], [9, 13, 0]];
+    let (found, _) = selected(&plane, &fixed, 6, ErrorBound::new(1, 1), true);
+    assert!(fixed.iter().all(|p| found.contains(p)));
+}
+
+/// Two clusters far apart, and a void between them that one long triangle covers.
+#[test]
+fn blocks_far_apart_agree() {
+    let hill = |x: i32, y: i32| (x % 97 - 48).pow(2) / 9 + (y % 89 - 44).pow(2) / 7;
+    let mut points = BTreeSet::new();
+    for i in 0..4000 {
+        let (x, y) = (i * 7919 % 1009, i * 104_729 % 997);
+        points.insert([x, y]);
+        points.insert([x + 5_000_000, y / 9 + 3_000_000]);
+    }
+    let points: Vec<[i32; 3]> = points.into_iter().map(|[x, y]| [x, y, hill(x, y)]).collect();
+    let bound = ErrorBound::new(9, 2);
+    let whole = selected(&points, &[], 100_000_000, bound, true);
+    for (side, keeps) in [(100, true), (333, false), (1000, true)] {
+        assert_eq!(selected(&points, &[], side, bound, keeps), whole);
+    }
+    assert!(whole.1.greatest <= 9 << 19 && whole.0.len() > 1000 && whole.0.len() < points.len());
+}
+
+/// Hills of several sizes, and roughness of a step or two.
+fn hills(count: i32) -> Vec<[i32; 3]> {
+    let wave = |x: i32, y: i32, a: i32, b: i32, length: f64| (f64::from(a * x + b * y) / length).sin();
+    let height = |x: i32, y: i32| {
+        let shape =
+            900.0 * wave(x, y, 1, 2, 9000.0) + 200.0 * wave(x, y, 3, -1, 2100.0) + 25.0 * wave(x, y, -2, 5, 400.0);
+        shape as i32 + (x * 31 + y * 17) % 3
+    };
+    let mut places: Vec<[i32; 2]> = (0..count).map(|i| [i * 7919 % 20_011, (i * 104_729) % 19_997]).collect();
+    places.sort_unstable();
+    places.dedup();
+    places.into_iter().map(|[x, y]| [x, y, height(x, y)]).collect()
+}
+
+/// In rounds it takes no more points than one at a time, but for some percent.
+#[test]
+fn rounds_select_about_as_many_points_as_greedy_insertion() {
+    let points = hills(20_000);
+    let (bounds, hull) = (bounds_of(&points), crate::hull::hull_corners(points.clone()));
+    for steps in [4, 12, 40, 120, 400] {
+        let bound = ErrorBound::new(steps, 1);
+        let mut known = SelectedSites::none(bounds, points.len() as u64);
+        known.add(&hull);
+        let block = crate::block::Block::new(points.clone(), bounds, &known, &hull, canonical).unwrap();
+        let greedy = crate::block::greedy_insertion(block, &mut known, bound);
+        let (found, figures) = selected(&points, &[], 4_000, bound, true);
+        assert!(greedy > 40 && found.len() as u64 * 100 <= greedy * 108, "{steps}: {} and {greedy}", found.len());
+        assert!(figures.rounds > 2);
+    }
+}
+
+/// With small regions: every point is within the bound, and nothing depends on the blocks.
+#[test]
+fn regions_do_not_depend_on_blocks() {
+    let sizes = crate::regions::RegionSizes { undivided: 1_600, points: 100 };
+    let mut clouds = vec![hills(3_000)];
+    // A dense cluster, whose regions are divided again, and a line far away.
+    clouds.push((0..4_000).map(|i| [i % 63, i / 63, (i % 63) * (i / 63) % 29]).collect());
+    clouds[1].extend((0..50).map(|i| [40_000 + 100 * i, 90_000, i % 7]));
+    for points in clouds {
+        let (bounds, bound) = (bounds_of(&points), ErrorBound::new(12, 1));
+        let run = |side: i32, keeps: bool| {
+            let cloud = Cloud::new(&points, &points[700..702], side, keeps);
+            let found = crate::select::select_by_regions(&cloud, bounds, points.len() as u64, bound, sizes).unwrap();
+            let mut all: Vec<_> = found.sites.within(bounds).collect();
+            all.sort_unstable();
+            (all, found.figures)
+        };
+        let (found, figures) = run(1_000_000, true);
+        for (side, keeps) in [(17, true), (900, false), (3_000, true)] {
+            assert_eq!(run(side, keeps), (found.clone(), figures), "blocks of {side}");
+        }
+        let chosen: BTreeSet<_> = found.iter().copied().collect();
+        assert_eq!(worst_points(&points, &chosen, bound), Vec::new());
+        assert!(points[700..702].iter().all(|point| chosen.contains(point)));
+        assert!(figures.greatest <= 12 << 20 && found.len() < points.len() * 9 / 10, "{}", found.len());
+    }
+}

@@ -1,0 +1,145 @@
+//! Meshes with `[output] max_error`: few vertices, every point within the bound, and the same mesh however the job is done.
+
+use crate::breaklines::Survey;
+use crate::clouds::{self, Cloud};
+use crate::levels::hills;
+use crate::parts::{in_files, in_parts};
+use crate::program::{Job, Said, gdt_batch, number};
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// Returns what `verify` says of the results of `job` and these inputs.
+#[track_caller]
+fn against(job: &Job, inputs: &[PathBuf]) -> Said {
+    let mut arguments = vec!["verify", "out", "--json", "--input"];
+    arguments.extend(inputs.iter().map(|file| file.to_str().unwrap()));
+    gdt_batch(job.folder(), &arguments)
+}
+
+fn within(job: Job, bound: &str) -> Job {
+    job.with("output", &format!("max_error = {bound}"))
+}
+
+/// Runs the job, whose points are in `inputs`, proves that they are within `bound`, and returns its report.
+#[track_caller]
+fn proved(job: &Job, inputs: &[PathBuf], bound: f64) -> Value {
+    let (report, verdict) = (job.report(), against(job, inputs).succeeded().json());
+    assert_eq!(verdict["verdict"], "proved", "{verdict}");
+    let (selection, greatest) = (&report["selection"], verdict["greatest_error"].as_f64().unwrap());
+    let reported = selection["greatest_error"].as_f64().unwrap();
+    assert!(greatest <= bound && (greatest - reported).abs() < 1e-5, "{greatest}, reported {reported}, of {bound}");
+    assert!(selection["mean_error"].as_f64().unwrap() <= greatest);
+    assert_eq!(selection["vertices"], report["sites"]);
+    report
+}
+
+#[test]
+fn every_point_is_within_the_bound_of_few_triangles() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = [clouds::write(folder.path(), "hills.csv", &hills(20_000, 3))];
+    let mut before = 20_000;
+    for bound in ["0.5", "2", "20"] {
+        let report = proved(&within(Job::on(&file).tiles_of(2_000), bound), &file, bound.parse().unwrap());
+        let sites = number(&report["sites"]);
+        assert!(sites > 10 && sites < before, "{bound}: {sites} of {before}");
+        assert_eq!(number(&report["selection"]["points"]) + number(&report["duplicates"]), 20_000);
+        before = sites;
+    }
+}
+
+#[test]
+fn the_mesh_is_the_same_however_the_job_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let clouds: [(&str, Cloud, &str); 3] = [
+        ("hills", hills(12_000, 3), "3"),
+        ("grid", clouds::with_heights((0..90).flat_map(|x| (0..90).map(move |y| [100 * x, 100 * y]))), "200"),
+        ("clusters", clouds::clusters(12_000), "100"),
+    ];
+    for (name, cloud, bound) in clouds {
+        let folder = folder.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        let files = in_files(&folder, &cloud, 60_000);
+        let turned: Vec<PathBuf> = files.iter().rev().cloned().collect();
+        let facts = |job: Job| {
+            let job = within(job, bound);
+            let report = job.report();
+            let of_selection = ["points", "vertices", "rounds", "greatest_error", "greatest_error_at", "mean_error"];
+            (job.digest(), of_selection.map(|figure| report["selection"][figure].clone()), number(&report["parts"]))
+        };
+        let (digest, selection, _) = facts(Job::on(&files));
+        let ways = [
+            Job::on(&turned).tiles_of(300).threads(1),
+            Job::on(&files).tiles_of(1_000).threads(4),
+            Job::on(&files).tiles_of(700).with("triangulation", "backend = \"reference\""),
+            in_parts(&turned, 3_000),
+            in_parts(&files, 900).with("limits", "memory = \"128 MiB\""),
+        ];
+        for (way, job) in ways.into_iter().enumerate() {
+            let (other, figures, parts) = facts(job);
+            assert_eq!((other, figures), (digest.clone(), selection.clone()), "{name}, {way}");
+            assert!(parts > 1 || way < 3, "{name}, {way}: {parts} parts");
+        }
+    }
+}
+
+#[test]
+fn breaklines_stay_edges_and_lakes_stay_flat() {
+    let survey = Survey::new(6_000);
+    let job = within(survey.job().tiles_of(700), "1.5");
+    let report = job.report();
+    let verdict = against(&job, std::slice::from_ref(&survey.cloud)).succeeded().json();
+    assert_eq!((&verdict["verdict"], &verdict["breaklines"]), (&"proved".into(), &report["breaklines"]["subsegments"]));
+    assert!(number(&report["sites"]) < number(&report["selection"]["points"]) * 9 / 10);
+    let whole = survey.job().report();
+    assert_eq!(report["breaklines"]["subsegments"], whole["breaklines"]["subsegments"]);
+}
+
+#[test]
+fn a_point_beyond_the_bound_fails_the_proof() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = hills(5_000, 3);
+    let file = [clouds::write(folder.path(), "hills.csv", &cloud)];
+    let job = within(Job::on(&file), "5");
+    proved(&job, &file, 5.0);
+    let mut other = cloud.clone();
+    // It lies beside a point of the cloud, far above it.
+    let [x, y, z] = cloud[2_500];
+    other.push([x + 1, y, z + 1_000_000]);
+    let said = against(&job, &[clouds::write(folder.path(), "other.csv", &other)]);
+    assert_eq!(said.code, 4, "{said:?}");
+    let failures = said.json()["failures"].to_string();
+    assert!(
+        failures.contains("points of the inputs that are more than max_error = 5 from the mesh: 1, the first"),
+        "{failures}"
+    );
+    other.pop();
+    other.push([x + 100_000_000, y, z]);
+    let said = against(&job, &[clouds::write(folder.path(), "other.csv", &other)]);
+    assert!(
+        said.json()["failures"].to_string().contains("points of the inputs outside the mesh: 1, the first"),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn what_is_no_bound_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = [clouds::write(folder.path(), "hills.csv", &hills(500, 3))];
+    for wrong in ["0", "-1", "\"auto\"", "inf", "[1]"] {
+        within(Job::on(&file), wrong).run().refused(2, &["max_error is \"none\" or a positive number"]);
+    }
+    let none = within(Job::on(&file), "\"none\"");
+    assert_eq!(none.report()["selection"], Value::Null);
+    assert_eq!(none.digest(), Job::on(&file).digest());
+}
+
+#[test]
+fn points_on_a_line_are_all_selected() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut line = clouds::line(300, 0);
+    line.sort_unstable();
+    line.dedup_by_key(|point| [point[0], point[1]]);
+    let file = [clouds::write(folder.path(), "line.csv", &line)];
+    let said = within(Job::on(&file), "5").run();
+    assert!(said.code == 3 && said.err.contains("one line"), "{said:?}");
+}
