@@ -26,6 +26,8 @@ mod attributes;
 mod bad_files;
 mod breaklines;
 mod broken;
+// These take the longest. Tests begin in the order of their names, so that others run beside them.
+mod browsers;
 mod choices;
 mod command_line;
 mod configuration;
@@ -72,5 +74,4 @@ mod tampering;
 mod tasks;
 mod texts;
 mod units;
-mod viewers;
 mod written;

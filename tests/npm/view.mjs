@@ -43,7 +43,7 @@ const profile = await mkdtemp(join(tmpdir(), 'gdt-view-'));
 const browser = spawn(chromium, [
   '--headless', '--no-sandbox', '--disable-gpu', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-quic',
   '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync', '--disable-dev-shm-usage',
-  `--user-data-dir=${profile}`, '--window-size=800,600', `http://127.0.0.1:${server.address().port}/${page}.html`,
+  `--user-data-dir=${profile}`, '--window-size=400,300', `http://127.0.0.1:${server.address().port}/${page}.html`,
 ], { stdio: ['ignore', 'ignore', 'pipe'] });
 let said = '';
 browser.stderr.on('data', (text) => { said = (said + text).slice(-4000); });

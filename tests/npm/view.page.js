@@ -5,7 +5,7 @@ import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { TilesRenderer } from '3d-tiles-renderer';
 
 const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
-renderer.setSize(800, 600);
+renderer.setSize(400, 300);
 document.body.append(renderer.domElement);
 const gltf = new GLTFLoader().setMeshoptDecoder(MeshoptDecoder);
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));

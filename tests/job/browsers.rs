@@ -190,7 +190,7 @@ fn cesium_styles_by_class_and_intensity() {
         let job = Job::on(&[&cloud]).tiles_of(1_000).with("output", &output).with("input", "crs = \"EPSG:32610\"");
         job.report();
         job.verified();
-        let request = asked(&job, &json!({"places": [], "pixels": [[300, 300], [500, 300]]}));
+        let request = asked(&job, &json!({"places": [], "pixels": [[150, 150], [250, 150]]}));
         let seen = answered(&job, &chromium, "cesium", &request);
         assert_eq!(seen["complaints"], json!([]), "{compression}");
         let found = &seen["attributes"];
