@@ -94,6 +94,80 @@ fn breaklines_stay_edges_and_lakes_stay_flat() {
     assert_eq!(report["breaklines"]["subsegments"], whole["breaklines"]["subsegments"]);
 }
 
+/// A bay opens into rough ground: the triangles over the bay are left out, and no others, however the job is done.
+#[test]
+fn the_hull_is_trimmed_where_there_are_no_points() {
+    let folder = tempfile::tempdir().unwrap();
+    // 170 points to a side, ten steps apart and moved a little. A wedge from the north is empty.
+    let place = |x: i64, y: i64| [10 * x + (7 * x + 3 * y) % 4, 10 * y + (5 * x + 11 * y) % 4];
+    let is_land = |x: i64, y: i64| y < 40 || (x - 85).abs() > (y - 40) / 2;
+    let all = (0..170).flat_map(|x| (0..170).map(move |y| (x, y)));
+    let cloud: Cloud =
+        all.filter(|&(x, y)| is_land(x, y)).map(|(x, y)| [place(x, y)[0], place(x, y)[1], x * y * 31 % 17]).collect();
+    let file = [clouds::write(folder.path(), "bay.csv", &cloud)];
+    let area = |job: &Job| {
+        let twice = |mesh: &[[[f64; 3]; 3]]| -> f64 {
+            mesh.iter().map(|[a, b, c]| ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs()).sum()
+        };
+        let files = std::fs::read_dir(job.out().join("tiles")).unwrap().map(|entry| entry.unwrap().path());
+        files.map(|path| twice(&mesh_of(&path))).sum::<f64>() / 2.0
+    };
+    let plain = || Job::on(&file).with("output", "compression = \"none\"");
+    let whole = within(plain().with("output", "hull = \"whole\""), "5");
+    let (wanted, bay) = (plain(), within(plain(), "5"));
+    let [wanted, whole, trimmed] = [&wanted, &whole, &bay].map(|job| {
+        job.report();
+        area(job)
+    });
+    assert!(whole > 1.1 * wanted, "{whole} {wanted}");
+    // Where the bay is narrow, its edges are not long.
+    let left = (trimmed - wanted) / (whole - wanted);
+    assert!(trimmed > 0.999 * wanted && left < 0.25, "{trimmed} of {wanted}, whole {whole}");
+    let report = bay.report();
+    assert!(number(&report["hull_triangles"]) > 0);
+    for other in [plain().tiles_of(500), plain().with("triangulation", "max_points_per_part = 6000").tiles_of(700)] {
+        let other = within(other, "5");
+        assert_eq!(other.report()["hull_triangles"], report["hull_triangles"]);
+        assert!((area(&other) - trimmed).abs() < 1e-6);
+    }
+}
+
+/// Returns the triangles of a GLB in the plane of its tile: x, y and height.
+fn mesh_of(path: &std::path::Path) -> Vec<[[f64; 3]; 3]> {
+    let tile = tiles::gltf::read::read_tile(path).unwrap();
+    let corner = |part: &tiles::gltf::read::TilePart, v: u32| {
+        let [x, up, z] = part.world(v as usize);
+        [x, -z, up]
+    };
+    tile.parts.iter().flat_map(|part| part.triangles.iter().map(move |t| t.map(|v| corner(part, v)))).collect()
+}
+
+/// A file that repeats points changes nothing.
+#[test]
+fn repeated_points_do_not_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = hills(9_000, 3);
+    let [once, again] = ["once.csv", "again.csv"].map(|name| clouds::write(folder.path(), name, &cloud));
+    let facts = |files: &[PathBuf]| {
+        let job = within(Job::on(files), "20");
+        let report = proved(&job, files, 20.0);
+        (job.digest(), report["selection"].clone())
+    };
+    assert_eq!(facts(std::slice::from_ref(&once)), facts(&[once, again]));
+}
+
+/// Flat ground has long and obtuse triangles along its hull, and they stay.
+#[test]
+fn flat_ground_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |x: i64, y: i64| [10 * x + (7 * x + 3 * y) % 4, 10 * y + (5 * x + 11 * y) % 4, (x + y) % 3];
+    let cloud: Cloud = (0..300).flat_map(|x| (0..300).map(move |y| place(x, y))).collect();
+    let file = [clouds::write(folder.path(), "flat.csv", &cloud)];
+    let report = proved(&within(Job::on(&file), "10"), &file, 10.0);
+    assert!(number(&report["sites"]) < 100, "{}", report["sites"]);
+    assert_eq!(number(&report["cut_triangles"]), 0);
+}
+
 #[test]
 fn a_point_beyond_the_bound_fails_the_proof() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,6 +202,9 @@ fn what_is_no_bound_is_refused() {
     for wrong in ["0", "-1", "\"auto\"", "inf", "[1]"] {
         within(Job::on(&file), wrong).run().refused(2, &["max_error is \"none\" or a positive number"]);
     }
+    let auto = within(Job::on(&file), "1").with("output", "max_edge = \"auto\"");
+    auto.run().refused(2, &["max_edge = \"auto\"", "give max_edge a length"]);
+    within(Job::on(&file), "1e-300").run().refused(2, &["max_error", "give a number such as 0.1"]);
     let none = within(Job::on(&file), "\"none\"");
     assert_eq!(none.report()["selection"], Value::Null);
     assert_eq!(none.digest(), Job::on(&file).digest());

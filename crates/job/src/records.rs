@@ -79,6 +79,8 @@ pub enum StepRecord {
     Read(PartIndex),
     /// The selected points by bucket.
     Selected,
+    /// The corners of the long triangles on ground, with `max_error`.
+    OnGround,
     /// How many sites there are around every place.
     Spacing,
     /// [`LevelSummary`]
@@ -102,6 +104,7 @@ impl RecordKey for StepRecord {
             StepRecord::Read(part) => [10, part.0],
             StepRecord::Spacing => [11, 0],
             StepRecord::Selected => [12, 0],
+            StepRecord::OnGround => [13, 0],
         }
     }
 }

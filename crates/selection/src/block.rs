@@ -242,12 +242,14 @@ pub(crate) struct Undecided {
 }
 
 /// The distances of a block's points from the triangulation.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct BlockErrors {
     /// The greatest, in units of [`VerticalError::fixed`], and the point that it belongs to.
     pub(crate) greatest: Option<(u64, [i32; 3])>,
     /// The sum, in the same units.
     pub(crate) sum: u128,
+    /// The triangles that hold points, of those that were asked about, and how many of the block.
+    pub(crate) holding: Vec<(TriangleKey, u64)>,
 }
 
 impl BlockErrors {
@@ -260,6 +262,7 @@ impl BlockErrors {
     /// Adds those of another block.
     pub(crate) fn join(mut self, other: BlockErrors) -> BlockErrors {
         self.add_greatest(other.greatest);
+        self.holding.extend(other.holding);
         BlockErrors { sum: self.sum + other.sum, ..self }
     }
 }
@@ -400,7 +403,8 @@ impl Block {
     }
 
     /// Returns the distances of all points that are not selected.
-    pub(crate) fn errors(&self) -> BlockErrors {
+    /// Also lists the triangles that hold some, of those that `asks_about` them.
+    pub(crate) fn errors(&self, asks_about: impl Fn([Site; 3]) -> bool) -> BlockErrors {
         let mut errors = BlockErrors::default();
         for triangle in 0..self.mesh.held.len() {
             let mut point = self.mesh.held[triangle].first;
@@ -409,12 +413,17 @@ impl Block {
             }
             let (sites, heights) = (self.mesh.corners(triangle), self.mesh.heights(triangle));
             let corners = [0, 1, 2].map(|k| [sites[k][0], sites[k][1], heights[k]]);
+            let mut count = 0;
             while point != NONE {
                 let place = self.points[point as usize];
                 let error = VerticalError::of(corners, place).fixed();
                 errors.sum += u128::from(error);
                 errors.add_greatest(Some((error, place)));
                 point = self.next[point as usize];
+                count += 1;
+            }
+            if asks_about(sites) {
+                errors.holding.push((self.mesh.key(triangle), count));
             }
         }
         errors

@@ -5,7 +5,7 @@
 //! them may make superfluous (`rounds.rs`).
 //!
 //! The canonical triangulation of a set of sites is unique, a round looks at nothing but a triangle and the points in it, and all of its points
-//! join at once. So the selection depends on the points, with those that repeat others, and the bound alone, not on how the points are divided into blocks, on
+//! join at once. So the selection depends on the points and the bound alone, not on how the points are divided into blocks, on
 //! threads or on the machine. All decisions are exact, in integers.
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]

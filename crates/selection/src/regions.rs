@@ -115,6 +115,11 @@ impl<E: Send> PointSource for Region<'_, E> {
         self.source.keeps_blocks(points, selected)
     }
 
+    fn asks_about(&self, _: [Site; 3]) -> bool {
+        // A triangle of a region need not be one of the whole.
+        false
+    }
+
     fn after_round(&self, round: u32, selected: u64) -> Result<(), E> {
         self.source.after_round(round, selected)
     }

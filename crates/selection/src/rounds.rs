@@ -8,7 +8,7 @@ use crate::block::{Block, BlockErrors, Proposal, SharedCandidate, TriangleKey, U
 use crate::error_bound::{Candidate, ErrorBound};
 use crate::selected_sites::SelectedSites;
 use crate::source::PointSource;
-use delaunay::geometry::Bounds;
+use delaunay::geometry::{Bounds, Site};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -38,6 +38,8 @@ pub struct Selection {
     pub sites: SelectedSites,
     /// Its figures.
     pub figures: Figures,
+    /// The triangles that hold points, of those that the source asks about, in order: their corners in ascending order, and how many.
+    pub holding: Vec<([Site; 3], u64)>,
 }
 
 /// What is known of a block between rounds.
@@ -106,7 +108,7 @@ impl<'a, E: Send> Rounds<'a, E> {
 
     fn add(&mut self, mut points: Vec<[i32; 3]>) {
         // Neighbours in the plane one after the other: what a block looks at for one is still in the cache for the next.
-        points.par_sort_unstable_by_key(|&point| (self.selected.place(point), point));
+        points.par_sort_unstable_by_key(|&point| (self.selected.cell_of(point), point));
         self.selected.add(&points);
         self.newly_selected = points;
     }
@@ -115,7 +117,7 @@ impl<'a, E: Send> Rounds<'a, E> {
     fn newly_selected_near(&self, bounds: Bounds<2>) -> impl Iterator<Item = &[i32; 3]> {
         let [rows, columns] = self.selected.rows_and_columns(bounds);
         let from = move |row: usize, column: usize| {
-            self.newly_selected.partition_point(|&point| self.selected.place(point) < [row, column])
+            self.newly_selected.partition_point(|&point| self.selected.cell_of(point) < [row, column])
         };
         rows.flat_map(move |row| &self.newly_selected[from(row, columns.start)..from(row, columns.end)])
     }
@@ -176,7 +178,8 @@ impl<'a, E: Send> Rounds<'a, E> {
     fn finish(mut self) -> Result<Selection, E> {
         let errors = (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|index| {
             let mut state = self.blocks[index].lock().unwrap_or_else(PoisonError::into_inner);
-            let errors = self.with_block(index, &mut state, |block| block.errors());
+            let errors =
+                self.with_block(index, &mut state, |block| block.errors(|corners| self.source.asks_about(corners)));
             // Nothing needs it any more.
             state.block = None;
             errors
@@ -187,7 +190,15 @@ impl<'a, E: Send> Rounds<'a, E> {
         (self.figures.greatest, self.figures.worst) =
             errors.greatest.map_or((0, None), |(error, point)| (error, Some(point)));
         self.figures.selected = self.selected.count();
-        Ok(Selection { sites: self.selected, figures: self.figures })
+        let mut holding = errors.holding;
+        holding.sort_unstable();
+        // Several blocks may hold points of one.
+        holding.dedup_by(|other, first| {
+            let is_same = other.0 == first.0;
+            first.1 += if is_same { other.1 } else { 0 };
+            is_same
+        });
+        Ok(Selection { sites: self.selected, figures: self.figures, holding })
     }
 
     /// Selects all points.
@@ -197,7 +208,7 @@ impl<'a, E: Send> Rounds<'a, E> {
             selected.add(&self.source.load(block)?.points);
         }
         let figures = Figures { points: self.figures.points, selected: selected.count(), ..Figures::default() };
-        Ok(Selection { sites: selected, figures })
+        Ok(Selection { sites: selected, figures, holding: Vec::new() })
     }
 }
 

@@ -9,23 +9,24 @@ use crate::source::{BlockPoints, PointSource};
 use delaunay::geometry::Bounds;
 use rayon::prelude::*;
 
-/// Selects points from the blocks of `source` until every point is within `bound` of the triangulation of the selected ones. All `points`
-/// points lie in `bounds`.
+/// Selects points from the blocks of `source` until every point is within `bound` of the triangulation of the selected ones.
 ///
 /// Of points on one line all are selected: there is no triangle.
 ///
 /// # Errors
 /// Those of `source`.
-pub fn select<S: PointSource>(
-    source: &S,
-    bounds: Bounds<2>,
-    points: u64,
-    bound: ErrorBound,
-) -> Result<Selection, S::Error> {
+pub fn select<S: PointSource>(source: &S, bound: ErrorBound) -> Result<Selection, S::Error> {
+    // Points are counted here, because a caller may not know which of them share a place.
+    let block = |block| Ok(BlockState::of(&source.load(block)?.points));
+    let found = (0..source.blocks()).into_par_iter().with_max_len(1).map(block);
+    let found = found.collect::<Result<Vec<BlockState>, S::Error>>()?;
+    let bounds = found.iter().filter_map(|state| state.bounds).reduce(Bounds::union);
+    let points = found.iter().map(|state| state.points).sum();
+    let bounds = bounds.unwrap_or(Bounds::of_point([0, 0]));
     select_by_regions(source, bounds, points, bound, RegionSizes::USUAL)
 }
 
-/// As [`select`]. A cloud of many points is divided into regions by the lattice, and points are selected from each of these by itself first.
+/// As [`select`], of `points` points in `bounds`. A cloud of many points is divided into regions by the lattice, and points are selected from each of these by itself first.
 pub(crate) fn select_by_regions<E: Send>(
     source: &dyn PointSource<Error = E>,
     bounds: Bounds<2>,

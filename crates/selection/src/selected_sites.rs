@@ -38,7 +38,7 @@ impl SelectedSites {
     }
 
     /// Returns the row and the column of the cell that a point lies in.
-    pub(crate) fn place(&self, point: [i32; 3]) -> [usize; 2] {
+    pub(crate) fn cell_of(&self, point: [i32; 3]) -> [usize; 2] {
         let [column, row] = self.cells.of(point[0], point[1]);
         [(row - self.first[1]) as usize, (column - self.first[0]) as usize]
     }
@@ -56,7 +56,7 @@ impl SelectedSites {
     /// Adds points that are none of it.
     pub(crate) fn add(&mut self, points: &[[i32; 3]]) {
         for point in points {
-            let [row, column] = self.place(*point);
+            let [row, column] = self.cell_of(*point);
             self.points[row * self.columns + column].push(*point);
         }
         self.count += points.len() as u64;

@@ -43,6 +43,9 @@ pub trait PointSource: Sync {
     /// time. About [`BYTES_PER_POINT`] are taken for each point then, and [`BYTES_PER_SELECTED`] for each selected one.
     fn keeps_blocks(&self, points: u64, selected: u64) -> bool;
 
+    /// Tells whether the caller wants to know how many points the triangle with these corners holds in the end.
+    fn asks_about(&self, corners: [Site; 3]) -> bool;
+
     /// Is called after each round with what has been selected so far.
     ///
     /// # Errors

@@ -43,6 +43,10 @@ impl PointSource for Cloud {
         self.keeps_blocks
     }
 
+    fn asks_about(&self, _: [Site; 3]) -> bool {
+        true
+    }
+
     fn after_round(&self, _: u32, _: u64) -> Result<(), delaunay::Error> {
         Ok(())
     }
@@ -60,11 +64,28 @@ fn selected(
     keeps: bool,
 ) -> (Vec<[i32; 3]>, Figures) {
     let bounds = bounds_of(points);
-    let Selection { sites, figures } =
-        select(&Cloud::new(points, fixed, side, keeps), bounds, points.len() as u64, bound).unwrap();
+    let Selection { sites, figures, holding } = select(&Cloud::new(points, fixed, side, keeps), bound).unwrap();
+    holds_the_others(&sites.within(bounds).collect::<BTreeSet<_>>(), points, &holding);
     let mut all: Vec<_> = sites.within(bounds).collect();
     all.sort_unstable();
     (all, figures)
+}
+
+/// Asserts that the listed triangles are those that hold points which are not selected, with their numbers.
+fn holds_the_others(selected: &BTreeSet<[i32; 3]>, points: &[[i32; 3]], holding: &[([Site; 3], u64)]) {
+    let all: Vec<Site> = selected.iter().map(|p| [p[0], p[1]]).collect();
+    let others: Vec<[i32; 3]> = points.iter().filter(|p| !selected.contains(*p)).copied().collect();
+    assert_eq!(holding.iter().map(|(_, count)| count).sum::<u64>(), others.len() as u64);
+    let (Ok(mesh), true) = (canonical(&all), others.len() < 3_000) else { return };
+    for triangle in mesh.corners().iter().map(|t| t.map(|v| all[v as usize])) {
+        let mut key = triangle;
+        key.sort_unstable();
+        let listed = holding.binary_search_by_key(&key, |(triangle, _)| *triangle).map_or(0, |at| holding[at].1);
+        let place = |p: &[i32; 3], k: usize| orient2d(triangle[k], triangle[(k + 1) % 3], [p[0], p[1]]);
+        let inside = others.iter().filter(|p| (0..3).all(|k| place(p, k) > 0)).count() as u64;
+        let touching = others.iter().filter(|p| (0..3).all(|k| place(p, k) >= 0)).count() as u64;
+        assert!((inside..=touching).contains(&listed), "{triangle:?}: {listed} of {inside} to {touching}");
+    }
 }
 
 /// Does rounds on all points at once, each from nothing, from these seeds on.

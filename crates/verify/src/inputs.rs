@@ -172,6 +172,7 @@ impl<'a> Inputs<'a> {
             points: 0,
             dropped: 0,
             has_lines,
+            places: 0,
             not_selected: selects.then(Vec::new),
             kinds: Default::default(),
         };
@@ -224,6 +225,15 @@ impl<'a> Inputs<'a> {
         let step = self.lattice.resolution_z.to_f64().unwrap_or(f64::NAN);
         let greatest_error = on_surface.flatten().map(|proof| proof.greatest * step);
         let has_no_bound = on_surface.is_some_and(|proof| proof.is_none());
+        let selected_from = self.facts.selection.map(|selection| selection.points).filter(|_| on_surface.is_some());
+        if let Some(reported) =
+            selected_from.filter(|&reported| !differences.has_lines && reported != differences.places)
+        {
+            failures.push(format!(
+                "the inputs have points at {} places, where report.json says that vertices were selected from {reported}",
+                differences.places
+            ));
+        }
         if let Some(proof) = on_surface.flatten() {
             failures.extend(differences.beyond(&proof, dropped));
         } else if on_surface.is_none() && differences.dropped != dropped && self.facts.input.is_some() {
@@ -283,6 +293,8 @@ struct Differences<'a> {
     /// The points that are no vertices, of a job with breaklines: these may have dropped them.
     dropped: u64,
     has_lines: bool,
+    /// The places with a vertex or a point.
+    places: u64,
     /// The points of the present bucket that are no vertices, of a job that selects vertices.
     not_selected: Option<Vec<[i32; 3]>>,
     kinds: [Difference; 3],
@@ -306,6 +318,7 @@ impl Differences<'_> {
         let (vertices, points) = group.split_at(group.partition_point(|place| place.source == VERTEX));
         let (points, lines) = points.split_at(points.partition_point(|place| place.source != LINE));
         self.points += points.len() as u64;
+        self.places += 1;
         if !lines.is_empty() {
             // A vertex of a line takes the place of points. Its height has been compared with the list.
             self.dropped += points.len() as u64;

@@ -56,6 +56,8 @@ pub(super) struct ReportedBreaklines {
 pub(super) struct ReportedSelection {
     /// The bound on the vertical distance of points from the mesh, in source units of height.
     pub(super) max_error: f64,
+    /// The points that vertices were selected from: places, not those at the same place.
+    pub(super) points: u64,
 }
 
 /// What a report says of points.

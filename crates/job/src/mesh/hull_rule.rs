@@ -8,27 +8,54 @@
 //! The edges along a way grow strictly, so it ends. Else the triangles on both sides of an edge would be obtuse over it, and the sum of
 //! the two angles above a half turn, which no Delaunay triangulation has. The way depends on the triangles alone.
 //!
+//! With `[output] max_error` flat ground has obtuse triangles with long edges along the hull too. Those that hold points stay,
+//! unless it is a few at their border.
+//!
 //! No way crosses a piece of a breakline: its closed disc is empty, so no triangle is obtuse over it. So a lake with a closed shore stays.
 
 use crate::plan::job_plan::Plan;
 use delaunay::geometry::Site;
+use delaunay::geometry::predicates::orient2d;
+use std::collections::HashSet;
+use std::sync::Arc;
+use sys::{Error, Result};
 
 /// An edge is long from this many times the mean spacing of all points on.
 const SPACINGS: u64 = 10;
-/// The same where `max_error` selects few of them: on flat ground, edges are as long as the cells of [`selection`] that have a vertex each, and
-/// some hundred spacings.
-const SPACINGS_OF_SELECTED: u64 = 400;
+/// The same where `max_error` selects few of them. A triangle on ground does not flow then, so triangles with such edges are listed: there are
+/// at most a few for each thousand points.
+const SPACINGS_OF_SELECTED: u64 = 50;
+/// A triangle is on ground if it holds at least one of so many points that its area would have if they lay evenly ...
+const SHARE_OF_AREA: u64 = 16;
+/// ... and one of so many that its longest side would have. A thin triangle over a bay holds a few at its ends.
+const SHARE_OF_SIDE: u64 = 8;
 
 /// The rule of a job.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct HullRule {
     /// The square of the longest edge that no triangle flows over, in square lattice steps.
     limit: u64,
+    /// Triangles on ground, which stay: corners in ascending order. `None` where all points are corners.
+    on_ground: Option<Arc<HashSet<[Site; 3]>>>,
 }
 
 impl HullRule {
-    /// Returns the rule of a job. It follows from what headers tell, so every step knows it, whatever the parts and tiles.
-    pub fn of(plan: &Plan) -> HullRule {
+    /// Returns the rule of a job. It follows from what headers tell, so every step knows it, whatever the parts and tiles; and with `max_error`
+    /// from what the selection has found.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if vertices are to be selected, and are not.
+    pub fn of(plan: &Plan) -> Result<HullRule> {
+        let rule = HullRule::of_lengths(plan);
+        match (plan.options.output.selects(), plan.on_ground.get()) {
+            (false, _) => Ok(rule),
+            (true, Some(on_ground)) => Ok(HullRule { on_ground: Some(on_ground), ..rule }),
+            (true, None) => Err(Error::Broken("the vertices are not selected".into())),
+        }
+    }
+
+    /// Returns the rule that takes no triangle for one on ground.
+    pub(crate) fn of_lengths(plan: &Plan) -> HullRule {
         let spacings = if plan.options.output.selects() { SPACINGS_OF_SELECTED } else { SPACINGS };
         HullRule::of_points(plan.records, plan.claimed_area, spacings)
     }
@@ -38,7 +65,7 @@ impl HullRule {
     fn of_points(points: u64, area: u64, spacings: u64) -> HullRule {
         let points = points.max(1);
         let limit = u128::from(spacings * spacings) * u128::from(area.max(points)) / u128::from(points);
-        HullRule { limit: u64::try_from(limit).unwrap_or(u64::MAX) }
+        HullRule { limit: u64::try_from(limit).unwrap_or(u64::MAX), on_ground: None }
     }
 
     /// Returns the longest edge that no triangle flows over, in lattice steps.
@@ -62,7 +89,27 @@ impl HullRule {
         }
         let is_obtuse = |&apex: &usize| dot(corners[apex], corners[(apex + 1) % 3], corners[(apex + 2) % 3]) < 0;
         let from = ((0..3).find(is_obtuse)? + 1) % 3;
-        self.is_long(corners[from], corners[(from + 1) % 3]).then_some(from)
+        (self.is_long(corners[from], corners[(from + 1) % 3]) && !self.is_on_ground(corners)).then_some(from)
+    }
+
+    fn is_on_ground(&self, mut corners: [Site; 3]) -> bool {
+        corners.sort_unstable();
+        self.on_ground.as_ref().is_some_and(|known| known.contains(&corners))
+    }
+
+    /// Tells whether a triangle that holds `count` points is on ground. A few at its border do not make it so.
+    pub(crate) fn has_ground(&self, corners: [Site; 3], count: u64) -> bool {
+        let [a, b, c] = corners;
+        let area = orient2d(a, b, c).unsigned_abs() / 2;
+        let longest =
+            [[a, b], [b, c], [c, a]].map(|[from, to]| dot(from, to, to) as u64).into_iter().max().unwrap_or(0);
+        // The limit is the square of so many spacings.
+        let is_enough = |points: u128, size: u64| {
+            points * u128::from(self.limit)
+                >= u128::from(size) * u128::from(SPACINGS_OF_SELECTED * SPACINGS_OF_SELECTED)
+        };
+        is_enough(u128::from(count * SHARE_OF_AREA), area)
+            && is_enough(u128::from(count * SHARE_OF_SIDE).pow(2), longest)
     }
 }
 
@@ -86,8 +133,21 @@ mod tests {
         assert_eq!(rule.flow([[5, 1], [0, 0], [11, 0]]), Some(1));
         assert_eq!(rule.flow([[0, 0], [10, 0], [5, 1]]), None, "not long");
         assert_eq!(rule.flow([[0, 0], [40, 0], [20, 20]]), None, "a right angle");
+        let known = HashSet::from([[[0, 0], [5, 1], [11, 0]]]);
+        let of_selected = HullRule { on_ground: Some(Arc::new(known)), ..rule.clone() };
+        assert_eq!(of_selected.flow([[5, 1], [0, 0], [11, 0]]), None, "on ground");
+        assert_eq!(of_selected.flow([[0, 0], [11, 0], [5, 2]]), Some(0), "another");
         let reach = 1 << 29;
         assert_eq!(rule.flow([[-reach, -reach], [reach, reach], [0, -1]]), Some(0), "the greatest extent");
+    }
+
+    #[test]
+    fn a_few_points_at_its_border_do_not_put_a_triangle_on_ground() {
+        // A point for each step: half of 1,600 squares.
+        let (rule, corners) = (HullRule::of_points(1, 1, SPACINGS_OF_SELECTED), [[0, 0], [40, 0], [0, 40]]);
+        assert!(rule.has_ground(corners, 50) && !rule.has_ground(corners, 49) && !rule.has_ground(corners, 0));
+        let thin = [[0, 0], [80, 0], [40, 1]];
+        assert!(rule.has_ground(thin, 10) && !rule.has_ground(thin, 9));
     }
 
     proptest! {
@@ -96,7 +156,7 @@ mod tests {
             corners in prop::array::uniform3(prop::array::uniform2(-60i32..60)),
             limit in 0u64..20_000,
         ) {
-            let rule = HullRule { limit };
+            let rule = HullRule { limit, on_ground: None };
             let square = |from: usize| {
                 let [a, b] = [corners[from], corners[(from + 1) % 3]];
                 dot(a, b, b)
@@ -111,7 +171,7 @@ mod tests {
         fn edges_grow_along_a_way(sites in prop::collection::btree_set(prop::array::uniform2(-30i32..30), 3..120)) {
             let sites: Vec<Site> = sites.into_iter().collect();
             let mesh = divide_and_conquer::triangulate(&sites).unwrap();
-            let rule = HullRule { limit: 0 };
+            let rule = HullRule { limit: 0, on_ground: None };
             let flow = |t: usize| {
                 let from = rule.flow(mesh.triangles[t].map(|v| sites[v.get()]))?;
                 Some(HalfEdgeIndex::of_triangle(t)[from])

@@ -75,7 +75,7 @@ pub fn triangulate_leaf(
     let triangles = Leaf::save(store, tile, &points, triangles)?;
     let vertex = |&site: &SiteIndex| BorderVertex { tile, site, position: points[site.get()].corner() };
     let is_root = cell.is_none();
-    let node_mesh = NodeMesh { mesh: &mesh, sites: &sites, found: &found, rule: HullRule::of(plan), is_root };
+    let node_mesh = NodeMesh { mesh: &mesh, sites: &sites, found: &found, rule: HullRule::of(plan)?, is_root };
     let NodeFlows { passes, questions, trimmed, slivers } = flows_of_leaf(&node_mesh, tile)?;
     let border = found.frontier.iter().map(vertex).collect();
     let frontier = Frontier { sites: border, boundary: found.boundary, passes, questions, triangles };

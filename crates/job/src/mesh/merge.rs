@@ -42,7 +42,7 @@ pub fn merge_frontiers(
     let found = find_final(&mesh, &sites, cell.as_ref(), |triangle| covered[triangle]);
     interrupt::check()?;
     let node_mesh =
-        NodeMesh { mesh: &mesh, sites: &sites, found: &found, rule: HullRule::of(plan), is_root: cell.is_none() };
+        NodeMesh { mesh: &mesh, sites: &sites, found: &found, rule: HullRule::of(plan)?, is_root: cell.is_none() };
     let flows = flows_of_merge(&node_mesh, &flows_below, |corners| corners.map(|v| union[v.get()].tile))?;
     let seam: Vec<SeamTriangle> = mesh
         .triangles

@@ -2,7 +2,9 @@
 
 use crate::durable::directory::JobDirectory;
 use crate::index::{PartIndex, TileIndex};
+use crate::mesh::hull_rule::HullRule;
 use crate::mesh::sites::load_sites;
+use crate::options::JobOptions;
 use crate::partition::bucket_sorter::BucketSorter;
 use crate::partition::buckets::Buckets;
 use crate::partition::part_points::{ReadBlocks, file_of_selected};
@@ -11,6 +13,7 @@ use crate::partition::point_file::{PointFile, PointFiles};
 use crate::partition::result::Partition;
 use crate::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory, working_memory};
 use crate::plan::job_plan::Plan;
+use crate::progress::number_text::grouped;
 use crate::{Error, Result};
 use delaunay::geometry::Site;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
@@ -79,6 +82,19 @@ fn fraction_of(bound: Decimal, step: Decimal) -> Option<ErrorBound> {
     }
 }
 
+/// Returns what is wrong if the memory has no room for so many selected points.
+pub(crate) fn too_many_vertices(options: &JobOptions, selected: u64) -> Option<String> {
+    let has_room = selected.saturating_mul(BYTES_PER_LISTED) <= working_memory(options) / 2;
+    (!has_room).then(|| {
+        format!(
+            "[output] max_error selects {} points or more, for which [limits] memory = \"{}\" has no room: set more memory or a greater \
+             max_error, or leave max_error out for a mesh of all points",
+            grouped(selected),
+            options.limits.memory
+        )
+    })
+}
+
 /// A part whose points have all been read, cut into blocks.
 pub(crate) struct PartInBlocks {
     pub(crate) part: PartIndex,
@@ -93,18 +109,27 @@ pub(crate) struct PointsInBlocks<'a> {
     triangulator: &'a Triangulator,
     parts: &'a [PartInBlocks],
     blocks: Vec<(usize, TileIndex)>,
+    /// Triangles that flow by it may be slivers along the hull, unless they are on ground.
+    rule: HullRule,
 }
 
 impl<'a> PointsInBlocks<'a> {
     pub(crate) fn new(plan: &'a Plan, triangulator: &'a Triangulator, parts: &'a [PartInBlocks]) -> PointsInBlocks<'a> {
         let blocks =
             |(number, part): (usize, &'a PartInBlocks)| part.partition.tree.tiles().map(move |tile| (number, tile));
-        PointsInBlocks { plan, triangulator, parts, blocks: parts.iter().enumerate().flat_map(blocks).collect() }
+        let blocks = parts.iter().enumerate().flat_map(blocks).collect();
+        PointsInBlocks { plan, triangulator, parts, blocks, rule: HullRule::of_lengths(plan) }
     }
 
     /// Returns the number of points, with those of which another has the same x and y.
     pub(crate) fn points(&self) -> u64 {
         self.parts.iter().map(|part| part.partition.kept).sum()
+    }
+
+    /// Returns the triangles on ground among those that hold so many points.
+    pub(crate) fn on_ground(&self, holding: Vec<([Site; 3], u64)>) -> Vec<[Site; 3]> {
+        let has_ground = |(corners, count): &([Site; 3], u64)| self.rule.has_ground(*corners, *count);
+        holding.into_iter().filter(has_ground).map(|(corners, _)| corners).collect()
     }
 
     fn sites(&self, part: usize, tile: TileIndex) -> Result<Vec<Point>> {
@@ -176,18 +201,17 @@ impl PointSource for PointsInBlocks<'_> {
             < working_memory(&self.plan.options)
     }
 
+    fn asks_about(&self, corners: [Site; 3]) -> bool {
+        self.rule.flow(corners).is_some()
+    }
+
     fn after_round(&self, _: u32, selected: u64) -> Result<()> {
         fault::point("select");
         interrupt::check()?;
-        if selected * BYTES_PER_LISTED > working_memory(&self.plan.options) / 2 {
-            let limit = self.plan.options.limits.memory;
-            return Err(sys::Error::Config(format!(
-                "[output] max_error selects more than {selected} points, for which [limits] memory = \"{limit}\" has no room: set a greater \
-                 max_error or more memory, or leave max_error out for a mesh of all points"
-            ))
-            .into());
+        match too_many_vertices(&self.plan.options, selected) {
+            Some(why) => Err(sys::Error::Config(why).into()),
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 

@@ -4,6 +4,7 @@ use crate::durable::atomic_file::{PendingFile, write_pending};
 use crate::index::PartIndex;
 use crate::options::JobOptions;
 use crate::plan::breaklines::PlannedBreaklines;
+use crate::plan::ground_triangles::GroundTriangles;
 use crate::plan::input_identity::RenamedInputs;
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::plan::missing_attributes::missing_attributes;
@@ -65,6 +66,9 @@ pub struct Plan {
     /// A sentence about a few points that stretch the area, if there are some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stretch: Option<String>,
+    /// With `max_error`: which long triangles lie on ground.
+    #[serde(skip)]
+    pub on_ground: GroundTriangles,
     /// What the user should know about the inputs. [`Plan::all_warnings`] adds what there is to know about the options.
     pub warnings: Warnings,
 }

@@ -11,6 +11,7 @@ use crate::plan::extent::{Extent, SourceBox, to_float};
 use crate::plan::far_points::{extent_without_outliers, farthest_file};
 use crate::plan::flat_points::flat_points;
 use crate::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of_geocentric};
+use crate::plan::ground_triangles::GroundTriangles;
 use crate::plan::height_range::HeightSample;
 use crate::plan::inputs::{check_missing_records, open_all};
 use crate::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
@@ -37,6 +38,7 @@ use rust_decimal::prelude::ToPrimitive;
 use sys::{Error, Result, Warnings};
 use tiles::color::HeightRange;
 use tiles::frame::Frame;
+use tiles::options::MaxEdge;
 
 /// A point's number in the job is kept in 40 bits.
 const MAX_RECORDS: u64 = 1 << 40;
@@ -50,6 +52,7 @@ const MAX_WARNINGS: usize = 50;
 /// [`Error::Config`] if there are no inputs or they do not fit together; [`Error::Input`] if one is bad and must not be left
 /// out; [`crate::Error::NoTerrain`] if none is left; [`Error::Io`] if one cannot be read.
 pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> crate::Result<Plan> {
+    refuse_contradicting_options(options)?;
     set_network_memory(network_memory(options));
     let (sources, skipped) = open_all(&options.input, &row_choice(options))?;
     plan_sources(sources, skipped, options, coarsening)
@@ -219,6 +222,7 @@ fn try_plan(
     let heights = sample.range_within(HeightRange { low, high });
     let plan = Plan {
         claims,
+        on_ground: GroundTriangles::default(),
         options: options.clone(),
         inputs: Vec::new(),
         skipped: Vec::new(),
@@ -242,6 +246,19 @@ fn try_plan(
         warnings,
     };
     Ok((plan, rules.into_iter().zip(claimed).collect()))
+}
+
+/// # Errors
+/// [`Error::Config`] for options that cannot be had together.
+fn refuse_contradicting_options(options: &JobOptions) -> Result<()> {
+    if options.output.selects() && options.output.max_edge == MaxEdge::Auto {
+        return Err(Error::Config(
+            "[output] max_edge = \"auto\" goes by the spacing of points, and with max_error flat ground has few vertices: give max_edge a \
+             length such as 30.0, or leave it out"
+                .into(),
+        ));
+    }
+    Ok(())
 }
 
 /// Returns what the user says of the coordinates of the sources. Of those that are transformed, the target says all.

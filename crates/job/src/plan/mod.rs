@@ -14,6 +14,7 @@ pub mod fingerprint;
 pub(crate) mod flat_points;
 pub(crate) mod geocentric_inputs;
 pub(crate) mod globe_system;
+pub mod ground_triangles;
 mod height_groups;
 pub(crate) mod height_range;
 pub mod input_identity;

@@ -2,7 +2,7 @@
 
 use crate::mesh::selection::bound_in_steps;
 use crate::plan::job_plan::Plan;
-use delaunay::geometry::{Bounds, Site};
+use delaunay::geometry::Site;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::triangulation::canonical;
 use points::Point;
@@ -54,8 +54,7 @@ pub fn estimated_vertices(plan: &Plan, kept: u64, bounds: &[f64]) -> Result<Vec<
 
 /// Returns how many of some points are selected.
 fn selected_of(points: &[[i32; 3]], bound: ErrorBound) -> Result<u64> {
-    let Some(bounds) = Bounds::of_points(points.iter().map(|point| [point[0], point[1]])) else { return Ok(0) };
-    let Selection { figures, .. } = select(&Sample(points), bounds, points.len() as u64, bound)?;
+    let Selection { figures, .. } = select(&Sample(points), bound)?;
     Ok(figures.selected)
 }
 
@@ -79,6 +78,10 @@ impl PointSource for Sample<'_> {
 
     fn keeps_blocks(&self, _: u64, _: u64) -> bool {
         true
+    }
+
+    fn asks_about(&self, _: [Site; 3]) -> bool {
+        false
     }
 
     fn after_round(&self, _: u32, _: u64) -> Result<()> {

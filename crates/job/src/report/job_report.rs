@@ -246,7 +246,7 @@ const MAX_NOTES: usize = 50;
 
 /// Returns the length of the edges that slivers have at least, in source units.
 fn hull_length(plan: &Plan) -> f64 {
-    HullRule::of(plan).length() * plan.lattice.resolution.to_f64().unwrap_or(f64::NAN)
+    HullRule::of_lengths(plan).length() * plan.lattice.resolution.to_f64().unwrap_or(f64::NAN)
 }
 
 impl Report {

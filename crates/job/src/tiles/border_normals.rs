@@ -42,7 +42,7 @@ pub(crate) fn finished_border(
 ) -> Result<FinishedBorder> {
     let frontier = Frontier::load(store, tree.leaf(tile))?;
     let PartialNormals { mut sums, rgb, class, intensity } = PartialNormals::load(store, tile)?;
-    let slivers = HullSlivers::new(style.hull, &seam.trimmed);
+    let slivers = HullSlivers::new(style.hull.as_ref(), &seam.trimmed);
     if !style.max_edge.keeps_all() || !slivers.is_empty() {
         take_left_out(store, tile, &frontier, &slivers, style, &mut sums)?;
     }

@@ -18,9 +18,11 @@ pub(crate) struct HullSlivers {
 
 impl HullSlivers {
     /// Returns the slivers of a tile from whose edges `trimmed` ways lead out of the hull; none without a `rule`.
-    pub(crate) fn new(rule: Option<HullRule>, trimmed: &[[Site; 2]]) -> HullSlivers {
+    pub(crate) fn new(rule: Option<&HullRule>, trimmed: &[[Site; 2]]) -> HullSlivers {
         match rule {
-            Some(_) if !trimmed.is_empty() => HullSlivers { rule, edges: trimmed.iter().copied().collect() },
+            Some(rule) if !trimmed.is_empty() => {
+                HullSlivers { rule: Some(rule.clone()), edges: trimmed.iter().copied().collect() }
+            }
             _ => HullSlivers::default(),
         }
     }
@@ -33,13 +35,14 @@ impl HullSlivers {
     /// Tells whether a triangle of the tile's seam is a sliver.
     pub(crate) fn has(&self, triangle: &SeamTriangle) -> bool {
         self.rule
+            .as_ref()
             .and_then(|rule| flow(rule, triangle.map(|corner| corner.plane())))
             .is_some_and(|edge| self.edges.contains(&edge))
     }
 
     /// Removes the slivers from the `triangles` that the tile's leaf has made final, and returns them. Both stay in order.
     pub(crate) fn take(&self, positions: &[[i32; 3]], triangles: &mut Vec<[u32; 3]>) -> Vec<[u32; 3]> {
-        let Some(rule) = self.rule else { return Vec::new() };
+        let Some(rule) = &self.rule else { return Vec::new() };
         let corners = |t: &[u32; 3]| t.map(|v| [positions[v as usize][0], positions[v as usize][1]]);
         let flows = triangles.iter().enumerate().filter_map(|(at, t)| Some((flow(rule, corners(t))?, at)));
         let flows: HashMap<[Site; 2], usize> = flows.collect();
@@ -59,6 +62,6 @@ impl HullSlivers {
 }
 
 /// Returns the edge over which a triangle flows.
-fn flow(rule: HullRule, corners: [Site; 3]) -> Option<[Site; 2]> {
+fn flow(rule: &HullRule, corners: [Site; 3]) -> Option<[Site; 2]> {
     rule.flow(corners).map(|from| [corners[from], corners[(from + 1) % 3]])
 }

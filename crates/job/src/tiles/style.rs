@@ -87,7 +87,7 @@ impl TileStyle {
             Some(curvature) => bent_frame(plan, curvature.clone(), bounds),
             None => with_steps(plan.frame.clone(), compression, bounds),
         };
-        let hull = (output.hull == Hull::Trimmed).then(|| HullRule::of(plan));
+        let hull = (output.hull == Hull::Trimmed).then(|| HullRule::of(plan)).transpose()?;
         let copyright = output.copyright().map(str::to_owned);
         let OutputOptions { attributes, normals, .. } = *output;
         let lines = plan.built_breaklines()?;

@@ -63,7 +63,7 @@ pub(crate) fn write_tile(
 ) -> Result<(TileStats, Vec<PendingFile>)> {
     let leaf = Leaf::load(store, tile)?;
     let border = FinishedBorder::load(store, tile)?;
-    let slivers = HullSlivers::new(style.hull, &seam.trimmed);
+    let slivers = HullSlivers::new(style.hull.as_ref(), &seam.trimmed);
     let mut content = TileContent::of_leaf(leaf, &border, &slivers, style);
     let own = seam.triangles.iter().copied().filter(|triangle| owner(triangle) == tile);
     let seam_triangles = content.add_seam(border_of, tile, own, &slivers, style)?;

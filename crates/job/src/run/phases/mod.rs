@@ -75,8 +75,6 @@ pub(crate) fn do_phases(run: &WholeRun, plan: Plan) -> Result<Report> {
 
 /// Reads and meshes all parts, or those that an interrupted run left. Returns what all of them hold.
 fn read_and_mesh(job: &Job, stores: &PartStores) -> Result<SitesOfParts> {
-    let appearance = early_appearance(job)?;
-    let mut front = appearance.clone().map(|appearance| WaitingTiles::new(job, stores, appearance));
     let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
     // Bytes of points that wait, by part.
     let mut waiting = vec![0; job.parts.all().len()];
@@ -91,8 +89,11 @@ fn read_and_mesh(job: &Job, stores: &PartStores) -> Result<SitesOfParts> {
     if selects {
         // Any point may decide about any other.
         job.parts.all().try_for_each(|part| read_next(part, &mut read, &mut waiting))?;
-        select_vertices(job, sum_up(job, read.iter())?.1)?;
+        sum_up(job, read.iter())?;
+        select_vertices(job)?;
     }
+    let appearance = early_appearance(job)?;
+    let mut front = appearance.clone().map(|appearance| WaitingTiles::new(job, stores, appearance));
     for part in job.parts.all() {
         if !selects {
             read_next(part, &mut read, &mut waiting)?;

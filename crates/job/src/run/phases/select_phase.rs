@@ -1,6 +1,8 @@
 //! Selecting the points that are vertices, of jobs with `[output] max_error`. All parts are read before, and none is meshed.
 
+use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::durable::directory::JobDirectory;
+use crate::durable::journal::records_of;
 use crate::index::PartIndex;
 use crate::mesh::selection::{PartInBlocks, PointsInBlocks, error_bound, points_per_block};
 use crate::partition::part_points::{PointsOfPart, file_of_selected};
@@ -10,10 +12,10 @@ use crate::records::{JobStep, StepRecord, Store};
 use crate::run::done::Done;
 use crate::run::folder::Folder;
 use crate::run::job::Job;
-use crate::run::part_entries::entries_of;
+use crate::run::part_entries::{entries_of, open_store};
 use crate::run::phases::read_phase::points_of;
 use crate::{Error, Result};
-use delaunay::geometry::Bounds;
+use delaunay::geometry::Site;
 use selection::{Figures, Selection, select};
 use serde::{Deserialize, Serialize};
 
@@ -35,18 +37,18 @@ pub(crate) fn selects(plan: &Plan) -> bool {
     plan.options.output.selects()
 }
 
-/// Selects the vertices of all parts, unless that is done. All points lie in `bounds`.
+/// Selects the vertices of all parts, unless that is done. All points have been read.
 ///
 /// # Errors
 /// [`Error::DamagedSteps`] if points are damaged; [`sys::Error::Io`] on the folders of the parts; [`Error::InUse`] if another process has one;
 /// [`sys::Error::Config`] if the memory does not hold the selection.
-pub(crate) fn select_vertices(job: &Job, bounds: Bounds<3>) -> Result<()> {
+pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     let Some(bound) = error_bound(job.plan)? else { return Ok(()) };
     let is_done = |part| {
         Ok(entries_of(&job.directory.part(part), job.header(part))?.iter().any(|entry| entry.step == JobStep::Select))
     };
     if job.parts.all().map(is_done).collect::<sys::Result<Vec<bool>>>()?.into_iter().all(|is_done| is_done) {
-        return Ok(());
+        return know_selection(job);
     }
     let directories: Vec<JobDirectory> = job.parts.all().map(|part| job.directory.part(part)).collect();
     // The lock of the first part is that of the phase: no other phase goes on before this one is done.
@@ -63,9 +65,8 @@ pub(crate) fn select_vertices(job: &Job, bounds: Bounds<3>) -> Result<()> {
     };
     let parts = job.parts.all().map(in_blocks).collect::<Result<Vec<PartInBlocks>>>()?;
     let source = PointsInBlocks::new(job.plan, job.triangulator, &parts);
-    let Bounds { min, max } = bounds;
-    let bounds = Bounds { min: [min[0], min[1]], max: [max[0], max[1]] };
-    let Selection { sites, figures } = select(&source, bounds, source.points(), bound)?;
+    let Selection { sites, figures, holding } = select(&source, bound)?;
+    let on_ground = source.on_ground(holding);
     let duplicates = source.points() - figures.points;
     stage.advance(source.points());
     let mut stages = vec![stage.finish()];
@@ -78,9 +79,28 @@ pub(crate) fn select_vertices(job: &Job, bounds: Bounds<3>) -> Result<()> {
         }
         let blocks = source.write_selected(number, &sites, job.parts, &directories[number], job.syncs())?;
         blocks.save_as(&folder.store, StepRecord::Selected)?;
+        if number == 0 {
+            ColumnWriter::default().push(&on_ground).write(&folder.store, StepRecord::OnGround)?;
+        }
         temporary += blocks.bytes();
         let selected = SelectedPart { all: figures, duplicates, temporary, blocks: blocks.len() };
         folder.record(JobStep::Select, selected, std::mem::take(&mut stages))?;
+    }
+    job.plan.on_ground.set(on_ground);
+    Ok(())
+}
+
+/// Tells the plan what the selection has found, if it is done. Later phases of jobs that have one fail without.
+///
+/// # Errors
+/// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store of the first part.
+pub(crate) fn know_selection(job: &Job) -> Result<()> {
+    let directory = job.directory.part(PartIndex::FIRST);
+    let entries = entries_of(&directory, job.header(PartIndex::FIRST))?;
+    if entries.iter().any(|entry| entry.step == JobStep::Select) {
+        let store = open_store(&directory, records_of(&entries).into_values())?;
+        let on_ground = ColumnReader::open(&store, StepRecord::OnGround)?.column::<[Site; 3]>()?;
+        job.plan.on_ground.set(on_ground.iter().copied());
     }
     Ok(())
 }

@@ -19,7 +19,7 @@ use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::part_store::PartStores;
 use crate::run::phases::publish_phase::wants_tileset;
 use crate::run::phases::read_phase::{read_for, sum_up};
-use crate::run::phases::select_phase::{select_vertices, selects};
+use crate::run::phases::select_phase::{know_selection, select_vertices, selects};
 use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
 use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
@@ -153,8 +153,8 @@ impl PartTask<'_> {
     fn select(&self, job: &Job) -> Result<()> {
         let progress = JobProgressByPart::of(self.job)?;
         progress.require(Phase::Read, self.task.count, |_| true)?;
-        let (_, bounds) = sum_up(job, progress.parts.iter().filter_map(|part| part.read.as_ref()))?;
-        select_vertices(job, bounds)
+        sum_up(job, progress.parts.iter().filter_map(|part| part.read.as_ref()))?;
+        select_vertices(job)
     }
 
     fn mesh(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
@@ -163,6 +163,7 @@ impl PartTask<'_> {
         if selects(job.plan) {
             // Of all parts: until then, the points of each are needed.
             JobProgressByPart::of(self.job)?.require(Phase::Select, self.task.count, |_| true)?;
+            know_selection(job)?;
         } else {
             JobProgressByPart::of_parts(self.job, is_reader)?.require(Phase::Read, self.task.count, is_reader)?;
         }
@@ -176,6 +177,7 @@ impl PartTask<'_> {
         progress.require(Phase::Read, tasks, |_| true)?;
         progress.require(Phase::Mesh, tasks, |_| true)?;
         let (_, bounds) = sum_up(job, progress.parts.iter().filter_map(|part| part.read.as_ref()))?;
+        know_selection(job)?;
         let mesh = progress.parts.iter().filter_map(|part| part.mesh.as_ref());
         join_parts(job, &PartStores::new(job), SitesOfParts { sites: mesh.map(|mesh| mesh.leaves.sites).sum(), bounds })
     }
@@ -200,6 +202,7 @@ impl PartTask<'_> {
     }
 
     fn joined(&self, job: &Job) -> Result<JoinedParts> {
+        know_selection(job)?;
         JoinedParts::open(job)?.ok_or_else(|| too_early(Phase::Join, &[1], 1))
     }
 }
