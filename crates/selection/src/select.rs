@@ -26,7 +26,8 @@ pub fn select<S: PointSource>(source: &S, bound: ErrorBound) -> Result<Selection
     select_by_regions(source, bounds, points, bound, RegionSizes::USUAL)
 }
 
-/// As [`select`], of `points` points in `bounds`. A cloud of many points is divided into regions by the lattice, and points are selected from each of these by itself first.
+/// As [`select`], of `points` points in `bounds`. A cloud of many points is divided into regions by the lattice, and points are selected from
+/// each of these by itself first.
 pub(crate) fn select_by_regions<E: Send>(
     source: &dyn PointSource<Error = E>,
     bounds: Bounds<2>,

@@ -1,4 +1,4 @@
-//! Step 2a, of jobs with `[output] max_error`: the points of all parts as [`selection`] takes them, and writing those that it selects.
+//! Step 2a, for jobs with `[output] max_error`: the points of all parts as [`selection`] takes them, and writing those that it selects.
 
 use crate::durable::directory::JobDirectory;
 use crate::index::{PartIndex, TileIndex};

@@ -26,7 +26,7 @@ pub(crate) struct SelectedPart {
     pub(crate) all: Figures,
     /// Points of all parts of which another has the same x and y.
     pub(crate) duplicates: u64,
-    /// Bytes of all points, and of those that were found when the part was done.
+    /// Bytes of the point files of all parts, with the selected points of those that were written when this part was done.
     pub(crate) temporary: u64,
     /// The number of blocks that the selected points of this part are in.
     blocks: u64,
@@ -108,7 +108,7 @@ pub(crate) fn know_selection(job: &Job) -> Result<()> {
 /// Returns the points of a part that are vertices: all, or those that are selected. `store` is that of the part.
 ///
 /// # Errors
-/// Those of [`points_of`]; [`Error::TooEarly`] if they are not selected.
+/// Those of [`points_of`]; [`sys::Error::Broken`] if they are not selected.
 pub(crate) fn vertices_of<'a>(job: &Job<'a>, part: PartIndex, store: &Store) -> Result<PointsOfPart<'a>> {
     if !selects(job.plan) {
         return points_of(job, part);
