@@ -245,7 +245,7 @@ mod tests {
         for Script { path, text } in scripts(&request) {
             assert_eq!(std::fs::read_to_string(path).unwrap(), text);
         }
-        let numbers = (1..=11).map(|number| format!("{number}\n")).collect::<String>();
+        let numbers = (1..=12).map(|number| format!("{number}\n")).collect::<String>();
         assert_eq!(std::fs::read_to_string(sent_path(&request)).unwrap(), numbers);
         assert!(home.join("job.slurm/read+4").is_dir() && home.join("job.slurm/publish").is_dir());
         let calls = std::fs::read_to_string(calls).unwrap();
@@ -258,8 +258,9 @@ mod tests {
         assert_eq!(calls[0], call("1", "plan", "", "plan.sh"));
         assert_eq!(calls[1], call("1-3", "read", " --dependency=afterany:1", "read.sh"));
         assert_eq!(calls[2], call("0-2", "read+4", " --dependency=afterany:1", "read.sh 4"));
-        assert_eq!(calls[3], call("1-3", "mesh", " --dependency=afterany:2:3", "mesh.sh"));
-        assert_eq!(calls.len(), 3 + 2 * 4);
-        assert_eq!(calls[10], call("1", "publish", " --dependency=afterany:9:10", "publish.sh"));
+        assert_eq!(calls[3], call("1", "select", " --dependency=afterany:2:3", "select.sh"));
+        assert_eq!(calls[4], call("1-3", "mesh", " --dependency=afterany:4", "mesh.sh"));
+        assert_eq!(calls.len(), 4 + 2 * 4);
+        assert_eq!(calls[11], call("1", "publish", " --dependency=afterany:10:11", "publish.sh"));
     }
 }
