@@ -5,6 +5,7 @@ use crate::clouds::{self, Cloud};
 use crate::levels::hills;
 use crate::parts::{in_files, in_parts};
 use crate::program::{Job, Said, gdt_batch, number};
+use crate::tileset::files_below;
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -109,8 +110,8 @@ fn the_hull_is_trimmed_where_there_are_no_points() {
         let twice = |mesh: &[[[f64; 3]; 3]]| -> f64 {
             mesh.iter().map(|[a, b, c]| ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs()).sum()
         };
-        let files = std::fs::read_dir(job.out().join("tiles")).unwrap().map(|entry| entry.unwrap().path());
-        files.map(|path| twice(&mesh_of(&path))).sum::<f64>() / 2.0
+        let files = files_below(&job.out().join("tiles"));
+        files.iter().map(|path| twice(&mesh_of(path))).sum::<f64>() / 2.0
     };
     let plain = || Job::on(&file).with("output", "compression = \"none\"");
     let whole = within(plain().with("output", "hull = \"whole\""), "5");
