@@ -370,6 +370,8 @@ pub struct TileSummary {
     pub error: f64,
     /// The greatest vertical distance to the exact mesh in metres.
     pub greatest_error: f64,
+    /// About the mean vertical distance to the exact mesh in metres.
+    pub typical_error: f64,
     /// The least and greatest lattice x, y, z of the exact mesh below. Without a triangle, the least are greater.
     corners: [[i32; 3]; 2],
     /// The vertices of its GLB; 0 if there is none.
@@ -381,7 +383,14 @@ impl TileSummary {
     /// Returns the summary of a tile over the exact mesh within `bounds`, whose GLB has `vertices`; 0 if there is no GLB.
     pub fn new(bounds: Option<Bounds<3>>, vertices: usize) -> TileSummary {
         let corners = bounds.map_or([[1; 3], [0; 3]], |bounds| [bounds.min, bounds.max]);
-        TileSummary { error: 0.0, greatest_error: 0.0, corners, vertices: vertices as u32, unused: 0 }
+        TileSummary {
+            error: 0.0,
+            greatest_error: 0.0,
+            typical_error: 0.0,
+            corners,
+            vertices: vertices as u32,
+            unused: 0,
+        }
     }
 
     /// Writes the record of exact tile `tile`.

@@ -44,6 +44,16 @@ impl SquareGrid {
         line(y, self.low[1]).min(self.rows - 1) * self.columns + line(x, self.low[0]).min(self.columns - 1)
     }
 
+    /// Returns how far a point is from the middle of its cell along the axis on which it is further, from 0 to 2^31 at the border.
+    #[inline(always)]
+    pub fn distance_from_middle(&self, p: &[i32; 3]) -> u32 {
+        let along = |axis: usize| {
+            let lines = (f64::from(p[axis]) - self.low[axis]) / self.side;
+            (lines - lines.floor() - 0.5).abs()
+        };
+        (along(0).max(along(1)) * f64::from(u32::MAX)) as u32
+    }
+
     /// Returns the cell of every point, as [`SquareGrid::cell`] does, of grids with fewer than 2^31 cells.
     pub fn cells_of(&self, points: &[[i32; 3]]) -> Vec<u32> {
         cells_of(self, points)

@@ -67,18 +67,18 @@ pub(crate) struct LevelContext<'a> {
 /// Returns the topmost tile of a part.
 pub(crate) type TopOf<'a> = &'a (dyn Fn(PartIndex) -> Result<Child> + Sync);
 
-/// Spacings of a level in its error.
-const SPACINGS: f64 = 4.4;
-
 /// The greatest part of a tile's width that its error is. A tile of a few vertices is worth showing from afar all the same.
 const PART_OF_WIDTH: f64 = 0.5;
 
-/// Returns the error in metres by which viewers choose the level of a tile within `bounds`: a multiple of the distance between its
-/// vertices, because nothing smaller than that is left in it, and the height by which its triangles miss the surface. With the greatest
+/// The mean distance of the surface for one metre of that of its vertices, which stand out of it in woods.
+const SURFACE_TO_VERTICES: f64 = 0.5;
+
+/// Returns the error in metres by which viewers choose the level of a tile within `bounds`: the distance between its vertices, because
+/// nothing smaller than that is left in it, and the height by which it misses the surface. With the greatest
 /// distance instead, every tree would make all levels equally bad, and viewers would load the exact tiles.
-fn seen_error(simple: &Simplified, frame: &Frame, bounds: Bounds<3>) -> f64 {
+fn seen_error(spacing: f64, typical_error: f64, frame: &Frame, bounds: Bounds<3>) -> f64 {
     let width = bounds.extent(0).max(bounds.extent(1)) as f64 * frame.resolution_metres()[0];
-    (SPACINGS * simple.spacing + simple.typical_error).min(PART_OF_WIDTH * width)
+    (spacing + SURFACE_TO_VERTICES * typical_error).min(PART_OF_WIDTH * width)
 }
 
 /// Makes coarser tile `index` of the hierarchy, whose children must exist. Stores what `tileset.json` says of it and of the exact
@@ -103,7 +103,11 @@ pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<(LevelS
                 // No distance is greater than the range of heights: both meshes lie within it.
                 let greatest = of_children(|own| own.greatest_error) + simple.greatest_error;
                 own.greatest_error = greatest.min(height_range(&context.style.frame, bounds));
-                own.error = seen_error(&simple, &context.style.frame, bounds).max(of_children(|own| own.error));
+                // What one level adds to the error has little to do with what the next one adds.
+                let before = of_children(|own| own.typical_error);
+                own.typical_error = (before * before + simple.typical_error * simple.typical_error).sqrt();
+                let seen = seen_error(simple.spacing, own.typical_error, &context.style.frame, bounds);
+                own.error = seen.max(of_children(|own| own.error));
                 own.vertices = tile.positions.len() as u32;
                 let path = context.directory.output().level(context.part.node_number(coarse.node));
                 let written = write_glb(&path, &tile, context.style)?;

@@ -27,22 +27,16 @@ pub(crate) struct Filling<'a> {
 
 impl<'a> Filling<'a> {
     /// Triangulates those vertices of `terrain` that are `kept`, among them all ends of the `boundary`, which has the terrain on its
-    /// left. The vertices that are `moved` have another height.
+    /// left.
     ///
     /// # Errors
     /// [`Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation, [`Error::Interrupted`].
-    pub(crate) fn new(
-        terrain: &'a [[i32; 3]],
-        kept: &[bool],
-        moved: &[(u32, i32)],
-        boundary: &[[u32; 2]],
-    ) -> Result<Filling<'a>> {
+    pub(crate) fn new(terrain: &'a [[i32; 3]], kept: &[bool], boundary: &[[u32; 2]]) -> Result<Filling<'a>> {
         let mut vertices = Vec::with_capacity(kept.iter().filter(|kept| **kept).count());
         vertices.extend((0u32..).zip(kept).filter(|(_, kept)| **kept).map(|(v, _)| v));
         let mut number = vec![SiteIndex(u32::MAX); kept.len()];
         vertices.iter().zip(0..).for_each(|(&v, n)| number[v as usize] = SiteIndex(n));
-        let mut positions: Vec<[i32; 3]> = vertices.iter().map(|&v| terrain[v as usize]).collect();
-        moved.iter().for_each(|&(v, height)| positions[number[v as usize].get()][2] = height);
+        let positions: Vec<[i32; 3]> = vertices.iter().map(|&v| terrain[v as usize]).collect();
         let sites: Vec<Site> = positions.iter().map(|&p| plane(p)).collect();
         let mesh = canonical(&sites).map_err(|e| Error::of_triangulation(e.is_stopped(), e))?;
         let boundary: Vec<_> = boundary.iter().map(|edge| edge.map(|v| number[v as usize])).collect();
@@ -69,14 +63,14 @@ impl<'a> Filling<'a> {
         locate(&self.mesh, &self.sites, start, plane(self.terrain[v as usize]), steps)
     }
 
-    /// Takes in vertex `v`, which the mesh does not have, at this `height`, and looks for its place from triangle `start` on. It leaves
-    /// the vertex out if that takes more than `steps`.
-    pub(crate) fn insert(&mut self, v: u32, height: i32, start: usize, steps: &mut u64) {
+    /// Takes in vertex `v`, which the mesh does not have, and looks for its place from triangle `start` on. It leaves the vertex out if
+    /// that takes more than `steps`.
+    pub(crate) fn insert(&mut self, v: u32, start: usize, steps: &mut u64) {
         let Some(triangle) = self.locate(v, start, steps).filter(|&triangle| self.within[triangle]) else { return };
-        let [x, y, _] = self.terrain[v as usize];
+        let position = self.terrain[v as usize];
         self.vertices.push(v);
-        self.positions.push([x, y, height]);
-        self.sites.push([x, y]);
+        self.positions.push(position);
+        self.sites.push(plane(position));
         insert(&mut self.mesh, &self.sites, SiteIndex::new(self.sites.len() - 1), triangle, |_| {});
         // Flips cross no edge of the boundary, so triangles stay on their side of it.
         self.within.resize(self.mesh.triangles.len(), true);

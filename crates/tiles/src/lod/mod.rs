@@ -3,11 +3,11 @@
 mod boundary;
 mod cell_grid;
 mod filling;
-mod furthest;
+mod fit;
 mod height_bounds;
 pub mod join;
 mod kept_lines;
+mod refine;
 pub mod simplify;
-mod surface;
 mod vertex_cells;
 pub mod vertical_error;

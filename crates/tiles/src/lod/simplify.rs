@@ -5,12 +5,9 @@
 //! terrains that meet along a part of their boundaries still meet there when either or both of them are simplified, the triangles
 //! cover the same ground once, as before, and the program's own pipeline makes them.
 //!
-//! Inside, the vertices that stay are chosen in two passes. First, one vertex of every cell of a grid stays: the one that is nearest to the
-//! height of the surface seen in the cell, which it takes. Then the triangulation of these is compared with the terrain: where a triangle
-//! is furthest from it, the vertex with the greatest distance stays too (Garland and Heckbert 1995, "Fast polygonal approximation of
-//! terrains and height fields", here with all vertices of a pass at once), with the mean height of its neighbours: see
-//! `surface.rs`. Vertices on the boundary keep their own heights, or terrains would not meet. So do vertices of breaklines: see
-//! `kept_lines.rs`.
+//! Inside, one of every cell of a coarse grid stays, and then in a few rounds those vertices that the triangulation is furthest from
+//! (`refine.rs`). At the end the heights of all inner vertices are moved to where they are nearest to the terrain around (`fit.rs`).
+//! Vertices on the boundary keep their own heights, or terrains would not meet. So do vertices of breaklines: see `kept_lines.rs`.
 
 #[cfg(test)]
 mod tests;
@@ -18,9 +15,9 @@ mod tests;
 use crate::frame::Frame;
 pub use crate::lod::filling::CoarseMesh;
 use crate::lod::filling::Filling;
-use crate::lod::furthest::{Furthest, steps_for};
+use crate::lod::fit::fit;
 use crate::lod::kept_lines::KeptLines;
-use crate::lod::surface::{seen_heights, smoothed};
+use crate::lod::refine::{Places, refine};
 use crate::lod::vertical_error::vertical_error;
 use breaklines::Breaklines;
 use delaunay::geometry::Bounds;
@@ -53,7 +50,7 @@ pub struct Simplified {
     pub mesh: CoarseMesh,
     /// The greatest vertical distance to the original in metres.
     pub greatest_error: f64,
-    /// The vertical distance in metres by which a triangle misses the surface at worst, on average over the triangles.
+    /// The mean vertical distance to the vertices of the original in metres.
     pub typical_error: f64,
     /// The distance in metres between vertices inside.
     pub spacing: f64,
@@ -62,11 +59,11 @@ pub struct Simplified {
 /// Vertices that stay inside for each triangle that is wanted, at least, however many vertices the boundary has.
 const LEAST_INSIDE: f64 = 1.0 / 16.0;
 
-/// One of this many vertices is looked at for the place of the grid, and in the second pass.
+/// One of this many vertices is looked at for the place of the grid.
 const LOOKED_AT: usize = 8;
 
-/// The share of the inner vertices that the first pass chooses.
-const BY_GRID: f64 = 0.9;
+/// The share of the inner vertices that the grid chooses. More of them leave too few for the places that need them, and fewer take more rounds.
+const BY_GRID: f64 = 0.3;
 
 /// Pieces of lines are at most this many times longer than vertices are apart. Longer ones would take too much room.
 const PIECES_TO_SPACING: f64 = 2.0;
@@ -92,23 +89,22 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
         return Ok(Simplified { mesh, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 });
     }
     let [xy, up] = frame.resolution_metres();
-    let heights = smoothed(positions, terrain.triangles, &boundary.on, LOOKED_AT);
     let mut kept = boundary.on.clone();
     let bounds = most_of(positions).unwrap_or(Bounds::of_point([0; 2]));
     let longest = PIECES_TO_SPACING * side_of(bounds, wanted);
     let kept_lines = KeptLines::choose(lines, positions, &boundary.on, wanted / 2, longest);
     kept_lines.vertices.iter().for_each(|&v| kept[v] = true);
     let by_grid = ((wanted - kept_lines.vertices.len()) as f64 * BY_GRID) as usize;
-    let (side, moved) = keep_by_grid(positions, bounds, by_grid, &kept_lines, &mut kept);
+    keep_by_grid(positions, bounds, by_grid, &kept_lines, &mut kept);
     interrupt::check()?;
-    let mut filling = Filling::new(positions, &kept, &moved, &boundary.edges)?;
-    let rest = (boundary.vertices + wanted).saturating_sub(filling.vertices.len());
-    let furthest = Furthest::find(positions, &heights, &kept, &filling, LOOKED_AT);
-    let typical_error = furthest.mean * up;
-    let mut steps = steps_for(rest);
-    for far in furthest.first(rest, |v| kept_lines.allows(v)) {
-        filling.insert(far.vertex, heights[far.vertex as usize / LOOKED_AT], far.triangle as usize, &mut steps);
-    }
+    let mut filling = Filling::new(positions, &kept, &boundary.edges)?;
+    let mut places = Places::new(positions, &filling);
+    let all = boundary.vertices + wanted;
+    refine(positions, &mut kept, |v| kept_lines.allows(v), &mut filling, &mut places, all)?;
+    let mut fixed = boundary.on.clone();
+    kept_lines.vertices.iter().for_each(|&v| fixed[v] = true);
+    let side = side_of(bounds, wanted);
+    let typical_error = fit(positions, |v| fixed[v as usize], &mut filling, &mut places)? * up;
     let mesh = filling.into_coarse();
     interrupt::check()?;
     let greatest_error = vertical_error(positions, terrain.triangles, &mesh) * up;
@@ -145,37 +141,22 @@ impl Boundary {
     }
 }
 
-/// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells within `bounds`: the one nearest to the height that
-/// is seen in the cell. Returns the side of a cell in lattice steps, and the vertices that were not `kept` already with that height.
-fn keep_by_grid(
-    positions: &[[i32; 3]],
-    bounds: Bounds<2>,
-    cells: usize,
-    lines: &KeptLines,
-    kept: &mut [bool],
-) -> (f64, Vec<(u32, i32)>) {
-    let side = side_of(bounds, cells);
+/// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells within `bounds`: the one nearest to the middle of the
+/// cell.
+fn keep_by_grid(positions: &[[i32; 3]], bounds: Bounds<2>, cells: usize, lines: &KeptLines, kept: &mut [bool]) {
     if cells == 0 {
-        return (side, Vec::new());
+        return;
     }
-    let grid = SquareGrid::new(bounds, side, cells as f64);
+    let grid = SquareGrid::new(bounds, side_of(bounds, cells), cells as f64);
     let cell_of = grid.cells_of(positions);
-    let heights = seen_heights(positions, &cell_of, grid.cells());
-    // The difference in height in the upper half of the bits, the vertex in the lower one.
+    // The distance from the middle in the upper half of the bits, the vertex in the lower one.
     let mut nearest = vec![u64::MAX; grid.cells()];
     let vertices = (0..).zip(positions.iter().zip(&cell_of));
     for (v, (p, &cell)) in vertices.filter(|(v, _)| lines.allows(*v as usize)) {
         let nearest = &mut nearest[cell as usize];
-        *nearest = (*nearest).min(u64::from(p[2].abs_diff(heights[cell as usize])) << 32 | v);
+        *nearest = (*nearest).min(u64::from(grid.distance_from_middle(p)) << 32 | v);
     }
-    let mut moved = Vec::with_capacity(nearest.len());
-    for (height, nearest) in heights.into_iter().zip(nearest).filter(|(_, nearest)| *nearest != u64::MAX) {
-        let v = nearest as u32;
-        if !std::mem::replace(&mut kept[v as usize], true) {
-            moved.push((v, height));
-        }
-    }
-    (side, moved)
+    nearest.into_iter().filter(|nearest| *nearest != u64::MAX).for_each(|nearest| kept[nearest as u32 as usize] = true);
 }
 
 /// Returns the side of square cells of which `cells` have the area of the box.

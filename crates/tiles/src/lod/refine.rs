@@ -1,0 +1,148 @@
+//! Which vertices a simplified terrain takes in beyond its first ones: those that it is furthest from (Garland and Heckbert 1995, "Fast
+//! polygonal approximation of terrains and height fields"), in a few rounds.
+
+use crate::lod::cell_grid::CellGrid;
+use crate::lod::filling::Filling;
+use crate::lod::vertex_cells::vertical_distance;
+use sys::{Result, interrupt};
+
+/// A round for each of these: one of this many vertices is looked at. The first rounds choose few.
+const LOOKED_AT: [usize; 4] = [8, 4, 2, 2];
+
+/// Steps of the walks to the vertices, on average, before the search gives up. Terrains need far fewer.
+const STEPS_PER_VERTEX: u64 = 64;
+
+/// Triangles in a cell, from one of which a walk starts.
+const TRIANGLES_PER_CELL: usize = 4;
+
+/// Where the vertices of a terrain are in a triangulation of some of them.
+pub(crate) struct Places {
+    /// For every vertex a triangle that holds it or is near it.
+    triangles: Vec<u32>,
+    /// The steps that walks may still take.
+    steps: u64,
+}
+
+impl Places {
+    /// Returns places near the vertices at `positions`.
+    pub(crate) fn new(positions: &[[i32; 3]], filling: &Filling) -> Places {
+        let starts = StartCells::new(filling);
+        let triangles = positions.iter().map(|p| starts.near(p) as u32).collect();
+        Places { triangles, steps: 4 * STEPS_PER_VERTEX * (positions.len() as u64 + 1000) }
+    }
+
+    /// Returns the triangle of `filling` that holds vertex `v`: `None` if that takes far longer than usual, where nearly all triangles are
+    /// slivers.
+    #[inline(always)]
+    pub(crate) fn locate(&mut self, v: u32, filling: &Filling) -> Option<usize> {
+        let start = self.triangles[v as usize] as usize;
+        let found = filling.locate(v, start, &mut self.steps)?;
+        self.triangles[v as usize] = found as u32;
+        Some(found)
+    }
+}
+
+/// Takes vertices of the terrain at `positions` into `filling` until it has `wanted`. Those that it has are `kept`; `allows` tells which
+/// others may be.
+///
+/// # Errors
+/// [`sys::Error::Interrupted`].
+pub(crate) fn refine(
+    positions: &[[i32; 3]],
+    kept: &mut [bool],
+    allows: impl Fn(usize) -> bool,
+    filling: &mut Filling,
+    places: &mut Places,
+    wanted: usize,
+) -> Result<()> {
+    for (round, every) in LOOKED_AT.into_iter().enumerate() {
+        interrupt::check()?;
+        let has = filling.vertices.len();
+        let growth = (wanted as f64 / has as f64).powf(1.0 / (LOOKED_AT.len() - round) as f64);
+        let count = ((has as f64 * growth).round() as usize).min(wanted).saturating_sub(has);
+        for far in furthest(positions, kept, &allows, filling, places, (round % every, every), count) {
+            kept[far.vertex as usize] = true;
+            places.insert(far.vertex, filling);
+        }
+    }
+    Ok(())
+}
+
+impl Places {
+    fn insert(&mut self, v: u32, filling: &mut Filling) {
+        let start = self.triangles[v as usize] as usize;
+        filling.insert(v, start, &mut self.steps);
+    }
+}
+
+/// A vertex that is over or under a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct FarVertex {
+    /// The vertical distance in steps of z.
+    distance: f64,
+    vertex: u32,
+}
+
+/// Returns of every triangle the furthest vertex among those that are looked at, and of these the `count` that are furthest, in the
+/// order of their triangles.
+fn furthest(
+    positions: &[[i32; 3]],
+    kept: &[bool],
+    allows: impl Fn(usize) -> bool,
+    filling: &Filling,
+    places: &mut Places,
+    (first, every): (usize, usize),
+    count: usize,
+) -> Vec<FarVertex> {
+    let mut furthest = vec![FarVertex { distance: 0.0, vertex: 0 }; filling.triangles()];
+    for v in (first..positions.len()).step_by(every).filter(|&v| !kept[v]) {
+        let Some(triangle) = places.locate(v as u32, filling) else { break };
+        let Some(corners) = filling.corners(triangle) else { continue };
+        let distance = vertical_distance(&corners.map(|site| filling.positions[site as usize]), positions[v]);
+        if distance > furthest[triangle].distance && allows(v) {
+            furthest[triangle] = FarVertex { distance, vertex: v as u32 };
+        }
+    }
+    furthest.retain(|far| far.distance > 0.0);
+    if count < furthest.len() {
+        // Distances are not negative, so their bits are in the same order.
+        let mut order: Vec<(u64, u32)> = furthest.iter().map(|far| (far.distance.to_bits(), far.vertex)).collect();
+        let least = order.len() - count;
+        let least = *order.select_nth_unstable(least.min(furthest.len() - 1)).1;
+        furthest.retain(|far| (far.distance.to_bits(), far.vertex) >= least);
+        furthest.truncate(count);
+    }
+    furthest
+}
+/// A triangle for every place, from which it is not far to the one that holds the place.
+struct StartCells {
+    cells: CellGrid,
+    /// A triangle with a corner in each cell, or near it.
+    triangles: Vec<u32>,
+}
+
+impl StartCells {
+    /// Notes the triangles of `filling` that lie within the boundary.
+    fn new(filling: &Filling) -> StartCells {
+        let cells = CellGrid::new(&filling.positions, filling.triangles() / TRIANGLES_PER_CELL + 1);
+        let mut triangles = vec![u32::MAX; cells.count()];
+        for triangle in 0..filling.triangles() {
+            if let Some([corner, ..]) = filling.corners(triangle) {
+                triangles[cells.of(&filling.positions[corner as usize]) as usize] = triangle as u32;
+            }
+        }
+        // Where a cell has none, that of the cell before it must do.
+        let mut last = triangles.iter().copied().find(|&triangle| triangle != u32::MAX).unwrap_or(0);
+        for triangle in &mut triangles {
+            if *triangle == u32::MAX {
+                *triangle = last;
+            }
+            last = *triangle;
+        }
+        StartCells { cells, triangles }
+    }
+
+    fn near(&self, place: &[i32; 3]) -> usize {
+        self.triangles[self.cells.of(place) as usize] as usize
+    }
+}
