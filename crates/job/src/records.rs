@@ -370,7 +370,7 @@ pub struct TileSummary {
     pub error: f64,
     /// The greatest vertical distance to the exact mesh in metres.
     pub greatest_error: f64,
-    /// About the mean vertical distance to the exact mesh in metres.
+    /// About the mean vertical distance to the vertices of the exact mesh in metres.
     pub typical_error: f64,
     /// The least and greatest lattice x, y, z of the exact mesh below. Without a triangle, the least are greater.
     corners: [[i32; 3]; 2],

@@ -44,14 +44,15 @@ impl SquareGrid {
         line(y, self.low[1]).min(self.rows - 1) * self.columns + line(x, self.low[0]).min(self.columns - 1)
     }
 
-    /// Returns how far a point is from the middle of its cell along the axis on which it is further, from 0 to 2^31 at the border.
+    /// Returns how far a point is from the middle of its cell along the axis on which it is further: 2^31 is the side of a cell, and the
+    /// greatest number stands for twice that and more.
     #[inline(always)]
     pub fn distance_from_middle(&self, p: &[i32; 3]) -> u32 {
-        let along = |axis: usize| {
-            let lines = (f64::from(p[axis]) - self.low[axis]) / self.side;
-            (lines - lines.floor() - 0.5).abs()
+        let along = |axis: usize, lines: usize| {
+            let at = (f64::from(p[axis]) - self.low[axis]) / self.side;
+            (at - at.floor().clamp(0.0, (lines - 1) as f64) - 0.5).abs()
         };
-        (along(0).max(along(1)) * f64::from(u32::MAX)) as u32
+        (along(0, self.columns).max(along(1, self.rows)) * f64::from(1u32 << 31)) as u32
     }
 
     /// Returns the cell of every point, as [`SquareGrid::cell`] does, of grids with fewer than 2^31 cells.
@@ -98,5 +99,9 @@ mod tests {
         assert_eq!(points.map(|[x, y, _]| grid.cell(x, y)), [0, 5, 0, 1]);
         assert_eq!(grid.cells_of(&points), [0, 5, 0, 1]);
         assert_eq!(SquareGrid::new(Bounds { min: [0, 0], max: [999, 0] }, 1.0, 10.0).cells(), 10);
+        let square = SquareGrid::new(Bounds { min: [0, 0], max: [39, 39] }, 10.0, 100.0);
+        let distance = |x: i32, y: i32| square.distance_from_middle(&[x, y, 0]);
+        assert_eq!([distance(15, 25), distance(20, 5), distance(15, 7)], [0, 1 << 30, (1u64 << 31) as u32 / 5]);
+        assert_eq!([distance(45, 5), distance(-5_000, 5)], [1 << 31, u32::MAX]);
     }
 }

@@ -6,14 +6,11 @@ use crate::lod::vertex_cells::plane;
 use delaunay::geometry::predicates::orient2d;
 use sys::{Result, interrupt};
 
-/// Rounds. Each after these changes heights by a few hundredths of the error.
+/// Rounds. Each further one would change heights by a few hundredths of the error.
 const ROUNDS: usize = 2;
 
-/// One of this many vertices is looked at in a round, and others in the next.
-const LOOKED_AT: usize = 2;
-
 /// Moves the heights of `filling` that are not `fixed` towards the least squares of the vertical distances to the terrain at `positions`.
-/// Returns the mean of the distances in steps of z.
+/// Returns the mean of the distances in steps of z, as they are before the last round.
 ///
 /// # Errors
 /// [`sys::Error::Interrupted`].
@@ -25,12 +22,12 @@ pub(crate) fn fit(
 ) -> Result<f64> {
     let mut error = 0.0;
     let mut heights: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
-    for round in 0..ROUNDS {
+    for _ in 0..ROUNDS {
         interrupt::check()?;
         // For every vertex the sum of the weights, and that of the distances times their weights.
         let mut sums = vec![[0.0; 2]; heights.len()];
         let (mut total, mut count) = (0.0, 0u64);
-        for v in (round % LOOKED_AT..positions.len()).step_by(LOOKED_AT) {
+        for v in 0..positions.len() {
             let Some(triangle) = places.locate(v as u32, filling) else { break };
             let Some(corners) = filling.corners(triangle) else { continue };
             let weights = weights(corners.map(|site| plane(filling.positions[site as usize])), plane(positions[v]));
@@ -49,7 +46,9 @@ pub(crate) fn fit(
                 *height += of_distances / of_weights;
             }
         }
-        error = total / count.max(1) as f64;
+        if count > 0 {
+            error = total / count as f64;
+        }
     }
     let of_terrain = positions.iter().map(|p| p[2]);
     let [low, high] = [of_terrain.clone().min().unwrap_or(0), of_terrain.max().unwrap_or(0)];

@@ -40,6 +40,12 @@ impl Places {
         self.triangles[v as usize] = found as u32;
         Some(found)
     }
+
+    /// Takes vertex `v` into `filling`.
+    fn insert(&mut self, v: u32, filling: &mut Filling) {
+        let start = self.triangles[v as usize] as usize;
+        filling.insert(v, start, &mut self.steps);
+    }
 }
 
 /// Takes vertices of the terrain at `positions` into `filling` until it has `wanted`. Those that it has are `kept`; `allows` tells which
@@ -66,13 +72,6 @@ pub(crate) fn refine(
         }
     }
     Ok(())
-}
-
-impl Places {
-    fn insert(&mut self, v: u32, filling: &mut Filling) {
-        let start = self.triangles[v as usize] as usize;
-        filling.insert(v, start, &mut self.steps);
-    }
 }
 
 /// A vertex that is over or under a triangle.
@@ -114,6 +113,7 @@ fn furthest(
     }
     furthest
 }
+
 /// A triangle for every place, from which it is not far to the one that holds the place.
 struct StartCells {
     cells: CellGrid,

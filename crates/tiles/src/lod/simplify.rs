@@ -62,7 +62,8 @@ const LEAST_INSIDE: f64 = 1.0 / 16.0;
 /// One of this many vertices is looked at for the place of the grid.
 const LOOKED_AT: usize = 8;
 
-/// The share of the inner vertices that the grid chooses. More of them leave too few for the places that need them, and fewer take more rounds.
+/// The share of the inner vertices that the grid chooses. A larger share leaves too few for the places that need them, a smaller one takes
+/// more rounds.
 const BY_GRID: f64 = 0.3;
 
 /// Pieces of lines are at most this many times longer than vertices are apart. Longer ones would take too much room.
@@ -103,7 +104,7 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     refine(positions, &mut kept, |v| kept_lines.allows(v), &mut filling, &mut places, all)?;
     let mut fixed = boundary.on.clone();
     kept_lines.vertices.iter().for_each(|&v| fixed[v] = true);
-    let side = side_of(bounds, wanted);
+    let side = side_of(bounds, filling.vertices.len() - boundary.vertices);
     let typical_error = fit(positions, |v| fixed[v as usize], &mut filling, &mut places)? * up;
     let mesh = filling.into_coarse();
     interrupt::check()?;
@@ -152,7 +153,8 @@ fn keep_by_grid(positions: &[[i32; 3]], bounds: Bounds<2>, cells: usize, lines: 
     // The distance from the middle in the upper half of the bits, the vertex in the lower one.
     let mut nearest = vec![u64::MAX; grid.cells()];
     let vertices = (0..).zip(positions.iter().zip(&cell_of));
-    for (v, (p, &cell)) in vertices.filter(|(v, _)| lines.allows(*v as usize)) {
+    let is_free = |v: usize| !kept[v] && lines.allows(v);
+    for (v, (p, &cell)) in vertices.filter(|(v, _)| is_free(*v as usize)) {
         let nearest = &mut nearest[cell as usize];
         *nearest = (*nearest).min(u64::from(grid.distance_from_middle(p)) << 32 | v);
     }
