@@ -27,12 +27,12 @@ pub(crate) fn fit(
         // For every vertex the sum of the weights, and that of the distances times their weights.
         let mut sums = vec![[0.0; 2]; heights.len()];
         let (mut total, mut count) = (0.0, 0u64);
-        for v in 0..positions.len() {
-            let Some(triangle) = places.locate(v as u32, filling) else { break };
+        for (v, &p) in (0..).zip(positions) {
+            let Some(triangle) = places.locate(v, filling) else { break };
             let Some(corners) = filling.corners(triangle) else { continue };
-            let weights = weights(corners.map(|site| plane(filling.positions[site as usize])), plane(positions[v]));
+            let weights = weights(corners.map(|site| plane(filling.positions[site as usize])), plane(p));
             let height: f64 = corners.iter().zip(weights).map(|(&site, weight)| weight * heights[site as usize]).sum();
-            let distance = f64::from(positions[v][2]) - height;
+            let distance = f64::from(p[2]) - height;
             total += distance.abs();
             count += 1;
             for (&site, weight) in corners.iter().zip(weights) {
