@@ -70,12 +70,12 @@ pub(crate) type TopOf<'a> = &'a (dyn Fn(PartIndex) -> Result<Child> + Sync);
 /// The greatest part of a tile's width that its error is. A tile of a few vertices is worth showing from afar all the same.
 const PART_OF_WIDTH: f64 = 0.5;
 
-/// The mean distance of the surface for one metre of that of its vertices, which stand out of it in woods.
+/// How far the surface is off on average, for each metre that its vertices are. In woods, vertices stand out of the surface.
 const SURFACE_TO_VERTICES: f64 = 0.5;
 
 /// Returns the error in metres by which viewers choose the level of a tile within `bounds`: the distance between its vertices, because
-/// nothing smaller than that is left in it, and the height by which it misses the surface. With the greatest
-/// distance instead, every tree would make all levels equally bad, and viewers would load the exact tiles.
+/// nothing smaller than that is left in it, and the height by which it misses the surface on average. With the greatest distance instead,
+/// every tree would make all levels equally bad, and viewers would load the exact tiles.
 fn seen_error(spacing: f64, typical_error: f64, frame: &Frame, bounds: Bounds<3>) -> f64 {
     let width = bounds.extent(0).max(bounds.extent(1)) as f64 * frame.resolution_metres()[0];
     (spacing + SURFACE_TO_VERTICES * typical_error).min(PART_OF_WIDTH * width)

@@ -6,11 +6,11 @@ use crate::lod::vertex_cells::plane;
 use delaunay::geometry::predicates::orient2d;
 use sys::{Result, interrupt};
 
-/// Rounds. Each further one would change heights by a few hundredths of the error.
+/// How often all heights move. Each further time would change them by a few hundredths of the error.
 const ROUNDS: usize = 2;
 
 /// Moves the heights of `filling` that are not `fixed` towards the least squares of the vertical distances to the terrain at `positions`.
-/// Returns the mean of the distances in steps of z, as they are before the last round.
+/// Returns the mean of the distances in steps of z, as they are before the heights move the last time.
 ///
 /// # Errors
 /// [`sys::Error::Interrupted`].
@@ -20,21 +20,20 @@ pub(crate) fn fit(
     filling: &mut Filling,
     places: &mut Places,
 ) -> Result<f64> {
+    let located = places.locate_all(filling);
     let mut error = 0.0;
     let mut heights: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
     for _ in 0..ROUNDS {
         interrupt::check()?;
         // For every vertex the sum of the weights, and that of the distances times their weights.
         let mut sums = vec![[0.0; 2]; heights.len()];
-        let (mut total, mut count) = (0.0, 0u64);
-        for (v, &p) in (0..).zip(positions) {
-            let Some(triangle) = places.locate(v, filling) else { break };
-            let Some(corners) = filling.corners(triangle) else { continue };
+        let mut total = 0.0;
+        for (&triangle, &p) in located.iter().zip(positions) {
+            let Some(corners) = filling.corners(triangle as usize) else { continue };
             let weights = weights(corners.map(|site| plane(filling.positions[site as usize])), plane(p));
             let height: f64 = corners.iter().zip(weights).map(|(&site, weight)| weight * heights[site as usize]).sum();
             let distance = f64::from(p[2]) - height;
             total += distance.abs();
-            count += 1;
             for (&site, weight) in corners.iter().zip(weights) {
                 let [of_weights, of_distances] = &mut sums[site as usize];
                 *of_weights += weight;
@@ -46,9 +45,7 @@ pub(crate) fn fit(
                 *height += of_distances / of_weights;
             }
         }
-        if count > 0 {
-            error = total / count as f64;
-        }
+        error = total / located.len().max(1) as f64;
     }
     let of_terrain = positions.iter().map(|p| p[2]);
     let [low, high] = [of_terrain.clone().min().unwrap_or(0), of_terrain.max().unwrap_or(0)];
@@ -67,43 +64,66 @@ fn weights(corners: [[i32; 2]; 3], p: [i32; 2]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lod::filling::Filling;
 
-    /// Noise around a plane, of which every seventh point is kept: the mean of the distances falls, and fixed vertices stay.
+    /// A lattice of 50 by 50 points, of which the outermost and every seventh are kept.
+    struct Square {
+        terrain: Vec<[i32; 3]>,
+        kept: Vec<bool>,
+        boundary: Vec<[u32; 2]>,
+    }
+
+    impl Square {
+        fn new(height: impl Fn(i32, i32) -> i32) -> Square {
+            let point = |i: i32| [i % 50 * 20, i / 50 * 20, height(i % 50, i / 50)];
+            let outermost = |i: i32| [0, 49].contains(&(i % 50)) || [0, 49].contains(&(i / 50));
+            let side = |from: u32, step: u32| (0..49).map(move |k| [from + k * step, from + (k + 1) * step]);
+            let back = |edge: [u32; 2]| [edge[1], edge[0]];
+            let (south, east) = (side(0, 1), side(49, 50));
+            let (north, west) = (side(2_450, 1).map(back), side(0, 50).map(back));
+            Square {
+                terrain: (0..2_500).map(point).collect(),
+                kept: (0..2_500).map(|i| i % 7 == 0 || outermost(i)).collect(),
+                boundary: south.chain(east).chain(north).chain(west).collect(),
+            }
+        }
+
+        /// Returns how far each point is above the filling.
+        fn distances(&self, filling: &Filling, places: &mut Places) -> Vec<f64> {
+            let distance = |(&triangle, &p): (&u32, &[i32; 3])| {
+                let corners = filling.corners(triangle as usize).unwrap().map(|site| filling.positions[site as usize]);
+                let weights = weights(corners.map(plane), plane(p));
+                f64::from(p[2]) - (0..3).map(|k| weights[k] * f64::from(corners[k][2])).sum::<f64>()
+            };
+            places.locate_all(filling).iter().zip(&self.terrain).map(distance).collect()
+        }
+    }
+
     #[test]
-    fn heights_move_to_the_middle_of_the_points_around() {
-        let terrain: Vec<[i32; 3]> =
-            (0..2_500i32).map(|i| [i % 50 * 20, i / 50 * 20, i % 50 * 3 + i * 7919 % 101]).collect();
-        let kept: Vec<bool> =
-            (0..2_500).map(|i| i % 7 == 0 || !(50..2_450).contains(&i) || [0, 49].contains(&(i % 50))).collect();
-        let edge = |from: u32, step: u32, count: u32| (0..count).map(move |k| [from + k * step, from + (k + 1) * step]);
-        let back = |edge: [u32; 2]| [edge[1], edge[0]];
-        let south_east = edge(0, 1, 49).chain(edge(49, 50, 49));
-        let boundary: Vec<[u32; 2]> =
-            south_east.chain(edge(2_450, 1, 49).map(back)).chain(edge(0, 50, 49).map(back)).collect();
-        let distances = |filling: &Filling, places: &mut Places| -> f64 {
-            (0..2_500)
-                .map(|v| {
-                    let triangle = places.locate(v, filling).unwrap();
-                    let corners = filling.corners(triangle).unwrap();
-                    let weights = weights(
-                        corners.map(|site| plane(filling.positions[site as usize])),
-                        plane(terrain[v as usize]),
-                    );
-                    let height: f64 =
-                        (0..3).map(|k| weights[k] * f64::from(filling.positions[corners[k] as usize][2])).sum();
-                    (height - f64::from(terrain[v as usize][2])).powi(2)
-                })
-                .sum()
-        };
-        let mut filling = Filling::new(&terrain, &kept, &boundary).unwrap();
-        let mut places = Places::new(&terrain, &filling);
-        let before = distances(&filling, &mut places);
-        let mean = fit(&terrain, |v| v.is_multiple_of(70), &mut filling, &mut places).unwrap();
-        let after = distances(&filling, &mut places);
+    fn heights_move_to_the_middle_of_the_points_around_but_for_fixed_ones() {
+        let square = Square::new(|x, y| 3 * x + (x + 50 * y) * 7919 % 101);
+        let mut filling = Filling::new(&square.terrain, &square.kept, &square.boundary).unwrap();
+        let mut places = Places::new(&square.terrain, &filling);
+        let squares = |distances: Vec<f64>| distances.iter().map(|d| d * d).sum::<f64>();
+        let before = squares(square.distances(&filling, &mut places));
+        let mean = fit(&square.terrain, |v| v.is_multiple_of(70), &mut filling, &mut places).unwrap();
+        let after = squares(square.distances(&filling, &mut places));
         assert!(after < 0.85 * before, "{after} of {before}");
         assert!((10.0..60.0).contains(&mean), "{mean}");
-        let stays = |v: u32, p: &[i32; 3]| !v.is_multiple_of(70) || *p == terrain[v as usize];
+        let stays = |v: u32, p: &[i32; 3]| !v.is_multiple_of(70) || *p == square.terrain[v as usize];
         assert!(filling.vertices.iter().zip(&filling.positions).all(|(&v, p)| stays(v, p)));
+    }
+
+    /// Points of every second column are as far above the middle as the others are below it.
+    #[test]
+    fn stripes_are_neither_lifted_nor_sunk() {
+        for sign in [1, -1] {
+            let square = Square::new(|x, _| sign * (1_000 * (x % 2) - 500));
+            let mut filling = Filling::new(&square.terrain, &square.kept, &square.boundary).unwrap();
+            let mut places = Places::new(&square.terrain, &filling);
+            fit(&square.terrain, |_| false, &mut filling, &mut places).unwrap();
+            let distances = square.distances(&filling, &mut places);
+            let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+            assert!(mean.abs() < 10.0, "{mean} of 500");
+        }
     }
 }

@@ -6,7 +6,7 @@ use crate::lod::filling::Filling;
 use crate::lod::vertex_cells::vertical_distance;
 use sys::{Result, interrupt};
 
-/// A round for each of these: one of this many vertices is looked at. The first rounds choose few.
+/// The rounds: each looks at one of this many vertices. The first rounds choose few.
 const LOOKED_AT: [usize; 4] = [8, 4, 2, 2];
 
 /// Steps of the walks to the vertices, on average, before the search gives up. Terrains need far fewer.
@@ -34,11 +34,18 @@ impl Places {
     /// Returns the triangle of `filling` that holds vertex `v`: `None` if that takes far longer than usual, where nearly all triangles are
     /// slivers.
     #[inline(always)]
-    pub(crate) fn locate(&mut self, v: u32, filling: &Filling) -> Option<usize> {
+    fn locate(&mut self, v: u32, filling: &Filling) -> Option<usize> {
         let start = self.triangles[v as usize] as usize;
         let found = filling.locate(v, start, &mut self.steps)?;
         self.triangles[v as usize] = found as u32;
         Some(found)
+    }
+
+    /// Returns the triangle of `filling` for each vertex, as far as [`Places::locate`] gets.
+    pub(crate) fn locate_all(&mut self, filling: &Filling) -> &[u32] {
+        let all = self.triangles.len();
+        let located = (0..all as u32).position(|v| self.locate(v, filling).is_none()).unwrap_or(all);
+        &self.triangles[..located]
     }
 
     /// Takes vertex `v` into `filling`.
@@ -64,7 +71,8 @@ pub(crate) fn refine(
     for (round, every) in LOOKED_AT.into_iter().enumerate() {
         interrupt::check()?;
         let has = filling.vertices.len();
-        let growth = (wanted as f64 / has as f64).powf(1.0 / (LOOKED_AT.len() - round) as f64);
+        // Not `powf`, whose last digit may differ between machines.
+        let growth = libm::pow(wanted as f64 / has as f64, 1.0 / (LOOKED_AT.len() - round) as f64);
         let count = ((has as f64 * growth).round() as usize).min(wanted).saturating_sub(has);
         for far in furthest(positions, kept, &allows, filling, places, (round % every, every), count) {
             kept[far.vertex as usize] = true;
@@ -82,8 +90,8 @@ struct FarVertex {
     vertex: u32,
 }
 
-/// Returns of every triangle the furthest vertex among those that are looked at, and of these the `count` that are furthest, in the
-/// order of their triangles.
+/// Returns of every triangle the furthest vertex among those that are looked at, and of these the `count` that are furthest, in
+/// ascending order.
 fn furthest(
     positions: &[[i32; 3]],
     kept: &[bool],
@@ -105,12 +113,11 @@ fn furthest(
     furthest.retain(|far| far.distance > 0.0);
     if count < furthest.len() {
         // Distances are not negative, so their bits are in the same order.
-        let mut order: Vec<(u64, u32)> = furthest.iter().map(|far| (far.distance.to_bits(), far.vertex)).collect();
-        let least = order.len() - count;
-        let least = *order.select_nth_unstable(least.min(furthest.len() - 1)).1;
-        furthest.retain(|far| (far.distance.to_bits(), far.vertex) >= least);
+        furthest.select_nth_unstable_by_key(count, |far| std::cmp::Reverse((far.distance.to_bits(), far.vertex)));
         furthest.truncate(count);
     }
+    // Vertices that follow each other are near each other, and so are their places in memory.
+    furthest.sort_unstable_by_key(|far| far.vertex);
     furthest
 }
 
