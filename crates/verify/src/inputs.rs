@@ -230,7 +230,7 @@ impl<'a> Inputs<'a> {
             selected_from.filter(|&reported| !differences.has_lines && reported != differences.places)
         {
             failures.push(format!(
-                "the inputs have points at {} places, where report.json says that vertices were selected from {reported}",
+                "the inputs have points at {} places, but report.json has {reported} points that vertices were selected from",
                 differences.places
             ));
         }

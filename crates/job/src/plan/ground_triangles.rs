@@ -9,7 +9,7 @@ use std::sync::{Arc, OnceLock};
 pub struct GroundTriangles(OnceLock<Arc<HashSet<[Site; 3]>>>);
 
 impl GroundTriangles {
-    /// Says which they are: their corners in ascending order. The first call counts.
+    /// Sets them: their corners in ascending order. Later calls change nothing.
     pub(crate) fn set(&self, triangles: impl IntoIterator<Item = [Site; 3]>) {
         self.0.get_or_init(|| Arc::new(triangles.into_iter().collect()));
     }
