@@ -1,5 +1,6 @@
 //! The command line: the commands and their options.
 
+use crate::cloud_job::CloudOptions;
 use crate::submit::Engine;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use clap_complete::Shell;
@@ -10,9 +11,11 @@ use std::path::PathBuf;
 /// What `--help` shows after the options.
 const AFTER_HELP: &str = "\
 Examples:
-  gdt-batch sample terrain.laz          write a sample terrain to try things on
+  gdt-batch sample cloud.laz            write a sample terrain to try things on
+  gdt-batch cloud.laz                   make a terrain of it, in cloud-terrain
+  gdt-batch tiles/ --surface ground     make bare earth of all point clouds in a folder, in tiles-terrain
   gdt-batch init *.laz                  write job.toml, a configuration for these clouds
-  gdt-batch job.toml                    run the job
+  gdt-batch job.toml                    run the job of a configuration
   gdt-batch check job.toml              what would the job read, how large is it, does it fit?
   gdt-batch info --histogram a.laz      what does a cloud hold, class by class?
   gdt-batch view out                    look at the terrain in a browser
@@ -42,23 +45,27 @@ const LONG_VERSION: &str = env!("GDT_LONG_VERSION");
 #[derive(Parser, Debug)]
 #[command(name = "gdt-batch", version, long_version = LONG_VERSION, after_help = AFTER_HELP, arg_required_else_help = true)]
 pub struct Cli {
-    /// The command; without one, gdt-batch runs the job of a configuration file.
+    /// The command; without one, gdt-batch runs a job.
     #[command(subcommand)]
     pub command: Option<CliCommand>,
-    /// The configuration of the job to run (TOML).
-    pub config: Option<PathBuf>,
+    /// Point clouds: files, folders, patterns such as "tiles/*.laz", URLs. Or the configuration of a job (TOML).
+    #[arg(value_name = "FILE")]
+    pub files: Vec<PathBuf>,
     /// Start the job over instead of continuing an interrupted run.
-    #[arg(long, requires = "config")]
+    #[arg(long, requires = "files")]
     pub restart: bool,
     /// The old name of `--restart`.
-    #[arg(long, requires = "config", hide = true)]
+    #[arg(long, requires = "files", hide = true)]
     pub fresh: bool,
-    /// Run the job even if it does not seem to fit the disk or the memory.
-    #[arg(long, requires = "config")]
+    /// Run the job even if it does not seem to fit the disk or the memory. With --write-config, replace the configuration.
+    #[arg(long, requires = "files")]
     pub force: bool,
     /// What to print.
     #[command(flatten)]
     pub print: PrintOptions,
+    /// What to make of point clouds.
+    #[command(flatten)]
+    pub clouds: CloudOptions,
 }
 
 /// What to print. These options may stand anywhere on the command line.

@@ -9,23 +9,23 @@ use clap_complete::Shell;
 /// What the program is called, whatever its file is called.
 const PROGRAM: &str = "gdt-batch";
 
-/// What the command line calls the configuration of a job, which stands where a command may stand.
-const CONFIG: &str = "config";
+/// What the command line calls the files of a job, which stand where a command may stand.
+const FILES: &str = "files";
 
 /// Where the script for zsh completes the first word.
 const FIRST_WORD: &str = "\":: :_gdt-batch_commands\" \\\n";
 
-/// What completes it: a command, or the configuration of a job.
+/// What completes it: a command, a point cloud, or the configuration of a job.
 const COMMAND_OR_FILE: &str = "\
-':: :{_alternative \"commands:command:_gdt-batch_commands\" \"files:configuration:_files\"}' \\
+':: :{_alternative \"commands:command:_gdt-batch_commands\" \"files:point cloud or configuration:_files\"}' \\
 ";
 
 /// Returns the script that lets `shell` complete the command line.
 pub fn script(shell: Shell) -> String {
     let mut definition = match shell {
         Shell::Bash => visible(&Cli::command()),
-        // With a place for the configuration, zsh would take a command for it, and the word after that for the command.
-        Shell::Zsh => without(&visible(&Cli::command()), CONFIG),
+        // With a place for files, zsh would take a command for one, and the word after that for the command.
+        Shell::Zsh => without(&visible(&Cli::command()), FILES),
         _ => with_values_as_commands(&visible(&Cli::command())),
     };
     let mut script = Vec::new();
@@ -104,12 +104,12 @@ fn for_bash(script: &str) -> String {
     lines.iter().skip_while(|line| line.is_empty()).map(|line| format!("{line}\n")).collect()
 }
 
-/// Returns the script for zsh with a configuration as the first word too. After it, the options of a job are completed.
+/// Returns the script for zsh with a file as the first word too. After it, the options of a job and more files are completed.
 fn for_zsh(script: &str) -> String {
     let Some((head, _)) = script.split_once(FIRST_WORD) else { return script.into() };
     let options: String = head.lines().filter(|line| line.starts_with('\'')).map(|line| format!("{line}\n")).collect();
     let of_job = format!(
-        "case $line[1] in\n            (*.*|*/*)\n_arguments \"${{_arguments_options[@]}}\" : \\\n{options}&& ret=0\n;;"
+        "case $line[1] in\n            (*.*|*/*)\n_arguments \"${{_arguments_options[@]}}\" : \\\n{options}'*:point cloud:_files' \\\n&& ret=0\n;;"
     );
     script.replacen(FIRST_WORD, COMMAND_OR_FILE, 1).replacen("case $line[1] in", &of_job, 1)
 }
@@ -137,12 +137,12 @@ mod tests {
 
     /// What zsh does with this, tests/job/command_line.rs tries where it is installed.
     #[test]
-    fn zsh_takes_the_first_word_for_a_command_or_for_a_configuration() {
+    fn zsh_takes_the_first_word_for_a_command_or_for_a_file() {
         let script = script(Shell::Zsh);
         let (head, rest) = script.split_once("case $line[1] in").unwrap();
-        assert!(head.contains(COMMAND_OR_FILE) && !head.contains("config --"), "{head}");
+        assert!(head.contains(COMMAND_OR_FILE) && !head.contains("files --"), "{head}");
         assert!(rest.trim_start().starts_with("(*.*|*/*)") && !script.contains("$line[2]"), "{script}");
         let (of_job, _) = rest.split_once(";;").unwrap();
-        assert!(of_job.contains("'--restart[") && !of_job.contains("_files"), "{of_job}");
+        assert!(of_job.contains("'--restart[") && of_job.contains("'*:point cloud:_files'"), "{of_job}");
     }
 }

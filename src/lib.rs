@@ -5,6 +5,8 @@
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 pub mod cli;
+pub mod cloud_job;
+pub mod command_words;
 pub mod completions;
 pub mod config;
 pub mod error;

@@ -2,11 +2,13 @@
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use gdt_batch::cli::{Cli, CliCommand, PrintOptions, ViewOptions};
+use gdt_batch::cloud_job::{self, CloudJob};
+use gdt_batch::command_words::{self, Named};
 use gdt_batch::error::{Error, Result};
 use gdt_batch::exit_code::{exit_code, exit_code_of_verify};
-use gdt_batch::init::NewConfiguration;
+use gdt_batch::init::{ConfigRequest, NewConfiguration};
 use gdt_batch::submit::local::LocalEngine;
 use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
@@ -55,15 +57,16 @@ fn command_line() -> Cli {
 
 fn run(cli: Cli) -> Result<ExitCode> {
     let print = cli.print;
-    match (&cli.command, &cli.config) {
-        (Some(_), Some(config)) => {
-            let config = config.display();
-            Err(sys::Error::Config(format!(
-                "{config} and a command: name the configuration after the command, or alone"
-            ))
-            .into())
+    match (&cli.command, &cli.files[..]) {
+        (Some(_), [first, ..]) => {
+            let first = first.display();
+            Err(sys::Error::Config(format!("{first} and a command: name files after the command, or without one"))
+                .into())
         }
-        (Some(CliCommand::Init { files, output, force }), _) => write_configuration(files, output, *force, print),
+        (Some(CliCommand::Init { files, output, force }), _) => {
+            let request = ConfigRequest { clouds: files.clone(), ..ConfigRequest::default() };
+            write_configuration(output, print, || Ok(init::init(&request, output, *force)?))
+        }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
         (Some(CliCommand::View(options)), _) => view_output(options, print),
@@ -105,25 +108,68 @@ fn run(cli: Cli) -> Result<ExitCode> {
         (Some(CliCommand::Man { command }), _) => {
             print_text(&manual::man(command.as_deref())?).map(|()| ExitCode::SUCCESS)
         }
-        (None, Some(config)) => run_job(config, &cli),
-        (None, None) => Err(sys::Error::Config("name a configuration file; --help shows how".into()).into()),
+        (None, []) => {
+            Err(sys::Error::Config("name point clouds or a configuration file; --help shows how".into()).into())
+        }
+        (None, files) => match command_words::named(files, &command_names())? {
+            Named::Configuration(config) => run_job(config, &cli),
+            Named::Clouds(clouds) => run_clouds(clouds, &cli),
+        },
     }
+}
+
+/// Returns the names of the commands that help shows.
+fn command_names() -> Vec<String> {
+    let all = Cli::command();
+    let shown = all.get_subcommands().filter(|command| !command.is_hide_set());
+    shown.map(|command| command.get_name().to_string()).collect()
 }
 
 /// Runs the job of a configuration file. Files that were left out are reported on standard error too, even with `--quiet`.
 fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
+    cloud_job::refuse_beside_configuration(&cli.clouds, path)?;
+    let options = run_options(cli);
+    let config = config::load(path)?;
+    interrupt::listen(exit_code)?;
+    show_report(&job::run(&config, options)?, &config, cli.print)
+}
+
+/// Returns how the command line wants a job to be run.
+fn run_options(cli: &Cli) -> RunOptions {
     if cli.fresh {
         say("--fresh has a new name: --restart; the old one still works");
     }
-    let options = RunOptions {
+    RunOptions {
         progress: ProgressOutput::detect(cli.print.quiet),
         force: cli.force,
         restart: cli.restart || cli.fresh,
         submission: 0,
+    }
+}
+
+/// Runs the job of point clouds, or writes its configuration.
+fn run_clouds(clouds: &[PathBuf], cli: &Cli) -> Result<ExitCode> {
+    let job = CloudJob::new(clouds, &cli.clouds)?;
+    if let Some(file) = &cli.clouds.write_config {
+        return write_configuration(file, cli.print, || Ok(job.write_configuration(file, cli.force)?));
+    }
+    let tell = |sentence: &str| {
+        if !cli.print.quiet {
+            say(sentence);
+        }
     };
-    let config = config::load(path)?;
     interrupt::listen(exit_code)?;
-    show_report(&job::run(&config, options)?, &config, cli.print)
+    let (report, config) = job.run(run_options(cli), tell)?;
+    let code = show_report(&report, &config, cli.print)?;
+    if !cli.print.quiet && !cli.print.json {
+        let directory = job.directory().display();
+        let next = match tiles::page::is_built_in() {
+            true => format!("look at it: gdt-batch view {}", job.directory_as_argument()),
+            false => "preview.png there shows it".into(),
+        };
+        print_text(&terminal::escape_controls(&format!("written to {directory}; {next}")))?;
+    }
+    Ok(code)
 }
 
 fn show_report(report: &Report, config: &JobOptions, print: PrintOptions) -> Result<ExitCode> {
@@ -210,16 +256,19 @@ fn submit(engine: Engine, request: &Request, added: &[String], print: PrintOptio
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes a configuration for point clouds. If the job does not fit this machine, a message says so once it is written.
-fn write_configuration(clouds: &[PathBuf], file: &Path, force: bool, print: PrintOptions) -> Result<ExitCode> {
+/// Writes the configuration that `make` makes to `file`. If the job does not fit this machine, a message says so once it is written.
+fn write_configuration(
+    file: &Path,
+    print: PrintOptions,
+    make: impl FnOnce() -> Result<NewConfiguration> + Send,
+) -> Result<ExitCode> {
     let is_printed = file == Path::new("-");
     if is_printed && print.json {
-        return Err(sys::Error::Config(
-            "--output - prints the configuration, and --json something else: leave out one".into(),
-        )
-        .into());
+        return Err(
+            sys::Error::Config("- prints the configuration, and --json something else: leave out one".into()).into()
+        );
     }
-    let made = on_threads(threads::available(), || init::init(clouds, file, force))?;
+    let made = on_threads(threads::available(), make)?;
     if is_printed {
         print_text(&made.text)?;
         return made.obstacle.map_or(Ok(ExitCode::SUCCESS), |obstacle| Err(obstacle.into()));

@@ -113,6 +113,30 @@ pub fn of_text(text: &str, base: &Path) -> Result<JobOptions> {
     Ok(options)
 }
 
+/// Checks that a configuration in the directory `base` can name this output directory.
+///
+/// # Errors
+/// [`Error::Config`] if it means something only to a shell.
+pub(crate) fn check_directory(directory: &str, base: &Path) -> Result<()> {
+    anchor("[output] directory", directory, base).map(drop).map_err(Error::Config)
+}
+
+/// Checks the value of an option.
+///
+/// # Errors
+/// A sentence about what is wrong with it.
+pub(crate) fn check_value(table: &str, key: &str, value: &toml::Value) -> std::result::Result<(), String> {
+    let mut file = toml::Table::new();
+    let files = toml::Value::Array(vec!["a".into()]);
+    for (table, key, value) in [("input", "files", &files), ("output", "directory", &"a".into()), (table, key, value)] {
+        let place = file.entry(table).or_insert_with(|| toml::Table::new().into());
+        if let Some(place) = place.as_table_mut() {
+            place.insert(key.into(), value.clone());
+        }
+    }
+    file.try_into::<ConfigFile>().map(drop).map_err(|error: toml::de::Error| error.message().into())
+}
+
 /// Makes the paths count from the working directory instead of `base`, the directory of the configuration. URLs stay, without what nobody
 /// may see.
 fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(), String> {

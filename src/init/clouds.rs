@@ -1,7 +1,7 @@
-//! Which point clouds the arguments of `init` mean, and what the configuration calls them.
+//! Which point clouds the arguments of a command mean, and what the configuration calls them.
 
 use crate::init::config_folder::{ConfigFolder, named};
-use crate::init::folder_files::{FolderFiles, LASER, TEXT, kind_of, leads_nowhere};
+use job::plan::folder_files::{FolderClouds, FolderFiles, kind_of, leads_nowhere};
 use points::{TextOptions, is_url};
 use std::collections::{BTreeMap, HashSet};
 use std::io::{self, ErrorKind};
@@ -22,7 +22,7 @@ pub(crate) struct NamedClouds {
 }
 
 impl NamedClouds {
-    /// Returns the clouds that `arguments` name: files, folders, or patterns. Without any, those of the current folder.
+    /// Returns the clouds that `arguments` name: files, folders, patterns, or URLs. Without any, those of the current folder.
     ///
     /// # Errors
     /// [`Error::Config`] if there is none, or one whose name no configuration can hold; [`Error::Io`] if something cannot be read.
@@ -33,7 +33,10 @@ impl NamedClouds {
         }
         let mut files = Vec::new();
         for argument in arguments {
-            refuse_url(argument)?;
+            if let Some(url) = argument.to_str().filter(|name| is_url(name)) {
+                clouds.patterns.push(url.to_string());
+                continue;
+            }
             match argument.metadata() {
                 Ok(data) if data.is_dir() => clouds.add_folder(argument, config)?,
                 Ok(_) => files.push(argument.clone()),
@@ -72,20 +75,11 @@ impl NamedClouds {
         Ok(())
     }
 
-    /// Adds the clouds of a folder: LAS and LAZ, or, if it has none, the texts that are point clouds.
+    /// Adds the clouds of a folder by their names, or by a pattern for all of one kind.
     fn add_folder(&mut self, folder: &Path, config: &ConfigFolder) -> Result<()> {
         let files = FolderFiles::of(folder)?;
-        let (laser, texts) = (files.with_endings(&LASER), files.with_endings(&TEXT));
-        if let Some(first) = texts.first().filter(|_| !laser.is_empty()) {
-            let (texts, them) = some(texts.len(), first);
-            self.notes.push(format!("{texts} left out beside LAS and LAZ: name {them} to read {them} too"));
-        }
-        let (clouds, others) = if laser.is_empty() { point_clouds(texts)? } else { (laser, Vec::new()) };
-        if clouds.is_empty() {
-            return Err(files.nothing_in(others.first()));
-        }
-        self.notes.extend(others.iter().map(|why| format!("left out, because it is no point cloud: {why}")));
-        self.notes.extend(files.broken_clouds().map(|link| format!("left out: {}", leads_nowhere(link))));
+        let FolderClouds { clouds, notes } = files.clouds(&TextOptions::default())?;
+        self.notes.extend(notes);
         let mut by_ending: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
         clouds.iter().for_each(|path| by_ending.entry(kind_of(path).1).or_default().push(path.clone()));
         for (ending, group) in by_ending {
@@ -121,17 +115,6 @@ impl NamedClouds {
     }
 }
 
-fn refuse_url(argument: &Path) -> Result<()> {
-    match argument.to_str().filter(|name| is_url(name)) {
-        // Its query may be a secret.
-        Some(url) => Err(Error::Config(format!(
-            "{}: init looks at files of this machine only; write URLs into [input] files yourself",
-            url.split('?').next().unwrap_or_default()
-        ))),
-        None => Ok(()),
-    }
-}
-
 /// Returns the error for an argument that names nothing, because of `error` at `path`.
 fn missing(argument: &Path, path: &Path, error: io::Error) -> Error {
     match error.kind() {
@@ -139,30 +122,6 @@ fn missing(argument: &Path, path: &Path, error: io::Error) -> Error {
             Error::Config(format!("there is no file {}: correct its name", argument.display()))
         }
         _ => Error::io("read", path)(error),
-    }
-}
-
-/// Returns those of `texts` that are point clouds, and why the others are none.
-///
-/// # Errors
-/// [`Error::Io`] if one cannot be read: it may be a point cloud.
-fn point_clouds(texts: Vec<PathBuf>) -> Result<(Vec<PathBuf>, Vec<Error>)> {
-    let (mut clouds, mut others) = (Vec::new(), Vec::new());
-    for text in texts {
-        match points::open(&text, &TextOptions::default()) {
-            Ok(_) => clouds.push(text),
-            Err(why @ Error::Input { .. }) => others.push(why),
-            Err(error) => return Err(error),
-        }
-    }
-    Ok((clouds, others))
-}
-
-/// Says that some texts are, and what to call them.
-fn some(count: usize, first: &Path) -> (String, &'static str) {
-    match count {
-        1 => (format!("{} is", first.display()), "it"),
-        _ => (format!("{count} texts, such as {}, are", first.display()), "them"),
     }
 }
 

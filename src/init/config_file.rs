@@ -25,12 +25,12 @@ pub(crate) fn check_may_be_written(file: &Path, replace: bool) -> Result<()> {
             (true, true) => Ok(()),
             (true, false) => Err(exists_already(file)),
             (false, _) => Err(Error::Config(format!(
-                "{} exists already and is no configuration of gdt-batch, so init does not replace it: give another name with --output",
+                "{} exists already and is no configuration of gdt-batch, so it is not replaced: give another name",
                 file.display()
             ))),
         },
         Err(_) if file.is_symlink() => Err(Error::Config(format!(
-            "{} is a link that leads nowhere: remove it, or give another name with --output",
+            "{} is a link that leads nowhere: remove it, or give another name",
             file.display()
         ))),
         Err(_) => Ok(()),
@@ -46,7 +46,7 @@ pub(crate) fn check_is_no_cloud(file: &Path, clouds: &[PathBuf]) -> Result<()> {
     let is_it = |cloud: &PathBuf| cloud.canonicalize().is_ok_and(|cloud| cloud == file_itself);
     match clouds.iter().find(|cloud| is_it(cloud)) {
         Some(cloud) => Err(Error::Config(format!(
-            "{} is one of the point clouds ({}), so init does not replace it: give another name with --output",
+            "{} is one of the point clouds ({}), so it is not replaced: give another name",
             file.display(),
             cloud.display()
         ))),
@@ -56,7 +56,10 @@ pub(crate) fn check_is_no_cloud(file: &Path, clouds: &[PathBuf]) -> Result<()> {
 
 /// Tells whether the file is a configuration of this program: one that `init` has written, or TOML with its table `[input]`. An empty file
 /// counts as one, because nothing is lost with it.
-fn is_configuration(file: &Path) -> Result<bool> {
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read.
+pub(crate) fn is_configuration(file: &Path) -> Result<bool> {
     let mut bytes = Vec::new();
     let read = File::open(file).and_then(|opened| opened.take(LONGEST + 1).read_to_end(&mut bytes));
     read.map_err(Error::io("read", file))?;
@@ -70,10 +73,7 @@ fn is_configuration(file: &Path) -> Result<bool> {
 }
 
 fn exists_already(file: &Path) -> Error {
-    Error::Config(format!(
-        "{} exists already: give another name with --output, or add --force to replace it",
-        file.display()
-    ))
+    Error::Config(format!("{} exists already: give another name, or add --force to replace it", file.display()))
 }
 
 /// Writes the file whole or not at all. A link stays, and its target is replaced, which keeps its permissions.

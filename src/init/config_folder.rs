@@ -67,6 +67,24 @@ impl ConfigFolder {
         })
     }
 
+    /// Returns what the configuration calls the folder at `path`, which need not be there yet.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the path is not UTF-8.
+    pub(crate) fn directory(&self, path: &Path) -> Result<String> {
+        let there = path.ancestors().find(|folder| named(folder).is_dir()).unwrap_or(Path::new(""));
+        let way = self.way_to(there)?;
+        // To join nothing would add a separator.
+        let way = if there == path { way } else { way.join(path.strip_prefix(there).unwrap_or(path)) };
+        match named(&way).to_str() {
+            Some(text) if cfg!(windows) => Ok(text.replace('\\', "/")),
+            Some(text) => Ok(text.to_string()),
+            None => {
+                Err(Error::Config(format!("{}: the name is not UTF-8: name another output directory", path.display())))
+            }
+        }
+    }
+
     /// Returns the path of a folder as it counts from here. It stays as the user wrote it where that leads to the same place.
     fn way_to(&self, folder: &Path) -> Result<PathBuf> {
         if self.is_current && folder.is_relative() {

@@ -34,9 +34,11 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
         page.blank();
         warnings.iter().for_each(|warning| page.say(&format!("Warning: {warning}.")));
     }
-    about_surface(&mut page, &findings, &sources, offers.ground);
+    about_surface(&mut page, &findings, draft, &sources, offers.ground);
     about_coordinates(&mut page, &findings, draft, (plan.crs.is_named(), offers.utm));
-    about_area(&mut page, &sources);
+    if !draft.sets("bounds") {
+        about_area(&mut page, &sources);
+    }
     about_output(&mut page, draft, preflight, plan);
     page.blank();
     page.set("[limits]");
@@ -54,7 +56,7 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
 }
 
 fn head(page: &mut Page, name: Option<&str>) {
-    page.say(&format!("{FIRST_WORDS}, written by `gdt-batch init`."));
+    page.say(&format!("{FIRST_WORDS}, written by the program."));
     if let Some(name) = name {
         page.show(&format!("gdt-batch check {name}"), "says what it would do");
         page.show(&format!("gdt-batch {name}"), "runs it");
@@ -74,14 +76,15 @@ fn files(patterns: &[String]) -> String {
     }
 }
 
-fn about_surface(page: &mut Page, findings: &Findings, sources: &[&Source], has_ground: bool) {
+fn about_surface(page: &mut Page, findings: &Findings, draft: &Draft, sources: &[&Source], has_ground: bool) {
     page.blank();
     page.say(&findings.classes);
     page.say(&findings.surface);
     if has_ground {
         page.offer("surface = \"ground\"", "bare earth: only points on the ground and on water");
     }
-    if sources.iter().any(|source| source.by_return.iter().skip(1).any(|count| *count > 0)) {
+    let has_returns = sources.iter().any(|source| source.by_return.iter().skip(1).any(|count| *count > 0));
+    if has_returns && !draft.sets("surface") {
         page.offer("surface = \"first\"", "roofs and tree tops: only first returns");
     }
 }
@@ -91,7 +94,7 @@ fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, (is_na
     page.say(&findings.unit);
     // What is transformed takes its unit from its system, and no other unit may contradict that of a CRS.
     let is_of_crs = draft.sets("to_crs") || is_named && !findings.unit_is_unknown;
-    if !is_of_crs {
+    if !is_of_crs && !draft.sets("unit") {
         let unit = if findings.unit_is_unknown { "us-foot" } else { "metre" };
         page.offer(&format!("unit = \"{unit}\""), "or \"metre\", \"foot\", \"us-foot\": whatever the files say");
     }
@@ -132,11 +135,13 @@ fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight, plan: &Pl
     let raster = format!("raster = {{ resolution = {cell} }}");
     page.offer("format = \"glb\"", "one file, as for Blender; \"3dtiles\" writes tiles for the web alone");
     page.offer("compression = \"none\"", "plain glTF, larger: QGIS needs it");
-    if let Some((option, what)) = max_error(preflight, plan) {
+    if let Some((option, what)) = max_error(preflight, plan).filter(|_| !draft.sets("max_error")) {
         page.offer(&option, &what);
     }
     page.offer("max_edge = \"auto\"", "leaves long triangles out, as over water; or a length such as 30.0");
-    page.offer(&raster, "also writes the heights as terrain.tif, with cells of this side");
+    if !draft.sets("raster") {
+        page.offer(&raster, "also writes the heights as terrain.tif, with cells of this side");
+    }
     page.offer("height_offset = \"egm96\"", "if heights count from the sea: then they are right on the globe");
     page.offer("copyright = \"(c) whose data\"", "goes into every file, and viewers show it");
     if is_built_in() {

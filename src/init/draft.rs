@@ -22,6 +22,11 @@ pub struct NeededLine {
 }
 
 impl NeededLine {
+    /// Returns a line that the user has chosen on the command line.
+    pub(crate) fn chosen(table: &'static str, key: &'static str, value: &toml::Value) -> NeededLine {
+        NeededLine { table, key, value: value.to_string(), why: "Set on the command line.".into() }
+    }
+
     pub(crate) fn of_input(key: &'static str, value: impl Into<toml::Value>, why: &str) -> NeededLine {
         NeededLine { table: "input", key, value: value.into().to_string(), why: why.into() }
     }
@@ -29,6 +34,11 @@ impl NeededLine {
     /// Tells whether the user decides on this line, because it loses points that another copy of the file may have.
     fn loses_points(&self) -> bool {
         ["max_malformed_fraction", "nodata"].contains(&self.key)
+    }
+
+    /// Tells whether this line leaves bad files out.
+    fn loses_files(&self) -> bool {
+        self.key == "on_bad_file"
     }
 
     pub(crate) fn of_limits(key: &'static str, value: impl Into<toml::Value>, why: &str) -> NeededLine {
@@ -43,29 +53,41 @@ pub(crate) struct Draft {
     pub(crate) files: Vec<String>,
     /// `[output] directory`.
     pub(crate) directory: String,
+    /// The lines that the user has chosen.
+    pub(crate) chosen: Vec<NeededLine>,
     /// The lines that are needed.
     pub(crate) needed: Vec<NeededLine>,
     /// The lines without which the job stops, but which lose points: the user decides on them, so they are written as comments.
     pub(crate) choices: Vec<NeededLine>,
+    /// Whether the user also decides on leaving bad files out.
+    pub(crate) stops_at_bad_files: bool,
     /// The folder of the configuration.
     pub(crate) folder: PathBuf,
 }
 
 impl Draft {
     pub(crate) fn new(files: Vec<String>, directory: String, folder: &ConfigFolder) -> Draft {
-        Draft { files, directory, needed: Vec::new(), choices: Vec::new(), folder: folder.path.clone() }
+        Draft {
+            files,
+            directory,
+            chosen: Vec::new(),
+            needed: Vec::new(),
+            choices: Vec::new(),
+            stops_at_bad_files: false,
+            folder: folder.path.clone(),
+        }
     }
 
     /// Returns the draft with these lines too.
     pub(crate) fn with(&self, lines: impl IntoIterator<Item = NeededLine>) -> Draft {
         let mut draft = self.clone();
         for line in lines {
-            if line.loses_points() { draft.choices.push(line) } else { draft.needed.push(line) }
+            let is_choice = line.loses_points() || self.stops_at_bad_files && line.loses_files();
+            if is_choice { draft.choices.push(line) } else { draft.needed.push(line) }
         }
         // A file that has lost points is a bad one: it would be left out whole before the user has decided.
         if !draft.choices.is_empty() {
-            let (of_files, needed): (Vec<_>, Vec<_>) =
-                draft.needed.into_iter().partition(|line| line.key == "on_bad_file");
+            let (of_files, needed): (Vec<_>, Vec<_>) = draft.needed.into_iter().partition(NeededLine::loses_files);
             draft.choices.splice(0..0, of_files);
             draft.needed = needed;
         }
@@ -77,9 +99,9 @@ impl Draft {
         Draft { choices: Vec::new(), ..self.clone() }
     }
 
-    /// Returns the lines that are needed, and those on which the user decides.
+    /// Returns the lines that the user has chosen, those that are needed, and those on which the user decides.
     pub(crate) fn all_lines(&self) -> impl Iterator<Item = &NeededLine> {
-        self.needed.iter().chain(&self.choices)
+        self.chosen.iter().chain(&self.needed).chain(&self.choices)
     }
 
     /// Returns whether one of the lines sets `key`.
@@ -87,9 +109,14 @@ impl Draft {
         self.all_lines().any(|line| line.key == key)
     }
 
-    /// Returns the needed lines of a table.
+    /// Returns whether the user has chosen `key`.
+    pub(crate) fn chooses(&self, key: &str) -> bool {
+        self.chosen.iter().any(|line| line.key == key)
+    }
+
+    /// Returns the chosen and the needed lines of a table.
     pub(crate) fn lines_of(&self, table: &str) -> impl Iterator<Item = &NeededLine> {
-        self.needed.iter().filter(move |line| line.table == table)
+        self.chosen.iter().chain(&self.needed).filter(move |line| line.table == table)
     }
 
     /// Returns the options of the job, as the program reads them from the configuration once the user has taken the choices.

@@ -42,7 +42,7 @@ impl Findings {
         let unit_is_unknown = plan.crs.horizontal == Unit::Unknown && !draft.sets("unit");
         Findings {
             points: points(draft, &sources, preflight, plan),
-            unit: unit(&sources, plan, unit_is_unknown),
+            unit: unit(draft, &sources, plan, unit_is_unknown),
             unit_is_unknown,
             crs: crs(draft, &sources, plan),
             classes: classes(&sources, plan),
@@ -93,12 +93,13 @@ pub(crate) fn rectangle(sources: &[&Source]) -> Option<[[f64; 2]; 2]> {
     })
 }
 
-fn unit(sources: &[&Source], plan: &Plan, is_unknown: bool) -> String {
+fn unit(draft: &Draft, sources: &[&Source], plan: &Plan, is_unknown: bool) -> String {
     if is_unknown {
         return "Unit: no file says it, so metres are taken. If the coordinates are in feet, say so here:".into();
     }
     let by = match sources.iter().any(|source| source.own_crs().is_named()) || plan.crs.is_named() {
         true => "as the coordinate reference system says",
+        false if draft.sets("unit") => "as this configuration sets it",
         false => "as the names of columns say",
     };
     let xy = plan.crs.horizontal.name();
@@ -116,7 +117,10 @@ pub(crate) fn unit_of_heights(plan: &Plan) -> Option<Unit> {
 
 fn crs(draft: &Draft, sources: &[&Source], plan: &Plan) -> String {
     let named: Vec<&&Source> = sources.iter().filter(|source| source.own_crs().is_named()).collect();
-    if draft.sets("crs") {
+    if draft.chooses("crs") && !draft.sets("to_crs") {
+        return format!("CRS: {}, as this configuration sets it.", plan.crs.label());
+    }
+    if draft.sets("crs") && !draft.sets("to_crs") {
         return "CRS: none, because the coordinates are not what the files say.".into();
     }
     if draft.sets("to_crs") {

@@ -10,7 +10,6 @@ mod config_folder;
 mod configuration;
 mod draft;
 mod findings;
-mod folder_files;
 mod offered_options;
 mod page;
 mod refusals;
@@ -19,14 +18,14 @@ mod suspect_heights;
 mod systems;
 mod triangle;
 
+use crate::config;
 use crate::init::clouds::NamedClouds;
 use crate::init::config_file::{check_is_no_cloud, check_may_be_written, write};
 use crate::init::config_folder::ConfigFolder;
 use crate::init::configuration::{choice_of, summary_of, text_of, units_of};
-use crate::init::draft::{Draft, options_of};
+use crate::init::draft::options_of;
 use crate::init::page::escape_controls;
 use crate::init::refusals::with_way_out;
-use crate::init::required_options::runnable;
 use crate::shell_word::quoted;
 use job::durable::directory::JobDirectory;
 use job::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
@@ -37,8 +36,13 @@ use job::{Error, Result};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use sys::terminal::is_obeyed;
 
+pub(crate) use crate::init::config_file::is_configuration;
+pub(crate) use crate::init::draft::Draft;
 pub use crate::init::draft::NeededLine;
+pub(crate) use crate::init::refusals::with_more;
+pub(crate) use crate::init::required_options::runnable;
 
 #[cfg(test)]
 mod tests;
@@ -77,26 +81,56 @@ pub struct NewConfiguration {
     pub obstacle: Option<Error>,
 }
 
-/// Makes a configuration for the clouds that `clouds` name, and writes it to `file`, unless that is `-`.
+/// What a configuration is to be made for.
+#[derive(Debug, Default)]
+pub struct ConfigRequest {
+    /// Point clouds: files, folders, patterns or URLs. Without any, those of the current folder are meant.
+    pub clouds: Vec<PathBuf>,
+    /// The lines that the user has chosen.
+    pub lines: Vec<NeededLine>,
+    /// The output directory. Without one, a free one beside the configuration is taken.
+    pub directory: Option<PathBuf>,
+    /// Whether a bad file stops the job until the user has decided. Otherwise the configuration leaves it out, and says so.
+    pub stops_at_bad_files: bool,
+}
+
+impl ConfigRequest {
+    /// Returns the draft of a configuration at `file`, or of one without a file, and what to know about files that are left out.
+    ///
+    /// # Errors
+    /// [`sys::Error::Config`] if there are no clouds, or if no configuration can name one of them, or the output directory.
+    pub(crate) fn draft(&self, file: Option<&Path>) -> Result<(Draft, Vec<String>)> {
+        let folder = ConfigFolder::of(file)?;
+        let NamedClouds { patterns, notes } =
+            NamedClouds::of(&self.clouds, &folder).map_err(|error| with_way_out(error.into()))?;
+        let directory = match &self.directory {
+            Some(directory) => folder.directory(directory)?,
+            None => free_directory(&folder.path, file)?,
+        };
+        config::check_directory(&directory, &folder.path)?;
+        let draft = Draft::new(patterns, directory, &folder);
+        Ok((Draft { chosen: self.lines.clone(), stops_at_bad_files: self.stops_at_bad_files, ..draft }, notes))
+    }
+}
+
+/// Makes the configuration for `request`, and writes it to `file`, unless that is `-`.
 ///
 /// # Errors
 /// [`sys::Error::Config`] if the file is there and may not be replaced, or there are no clouds; that of `check` if no configuration makes a
 /// job of them; [`sys::Error::Io`] if it cannot be written. A file is replaced only if it is a configuration.
-pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfiguration> {
+pub fn init(request: &ConfigRequest, file: &Path, replace: bool) -> Result<NewConfiguration> {
     let file = Some(file).filter(|file| *file != Path::new(STANDARD_OUTPUT));
     if let Some(file) = file {
         check_may_be_written(file, replace)?;
     }
-    let folder = ConfigFolder::of(file)?;
-    let NamedClouds { patterns, notes } =
-        NamedClouds::of(clouds, &folder).map_err(|error| with_way_out(error.into()))?;
-    let draft = Draft::new(patterns, free_directory(&folder.path, file)?, &folder);
+    let (draft, notes) = request.draft(file)?;
+    refuse_queries(&draft.files)?;
     if let Some(file) = file.filter(|file| file.exists()) {
         check_is_no_cloud(file, &input_paths(&draft.options()?.input)?)?;
     }
     let found = runnable(draft).map_err(with_way_out)?;
     let text = text_of(&found, file.map(as_argument).as_deref(), &notes);
-    options_of(&text, &folder.path)?;
+    options_of(&text, &found.draft.folder)?;
     if let Some(file) = file {
         write(file, &text, replace)?;
     }
@@ -110,6 +144,17 @@ pub fn init(clouds: &[PathBuf], file: &Path, replace: bool) -> Result<NewConfigu
         text,
         obstacle: found.stop.or(found.obstacle),
     })
+}
+
+/// Refuses to write down the query of a URL, which may be a secret.
+fn refuse_queries(files: &[String]) -> sys::Result<()> {
+    let place = |file: &String| file.split_once('?').map(|(place, _)| place.to_string());
+    match files.iter().filter(|file| points::is_url(file)).find_map(place) {
+        Some(place) => Err(sys::Error::Config(format!(
+            "{place}?...: the query of this URL may be a secret, so it is not written to a file: write the URL into [input] files yourself"
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// Returns an output directory in which nothing is in the way of a job, except the results of an earlier one. A configuration that is not
@@ -130,15 +175,19 @@ fn free_directory(folder: &Path, file: Option<&Path>) -> sys::Result<String> {
 }
 
 /// Returns the beginning of a name without signs that mean something in a configuration, in a shell or to a system.
-fn plain(name: &str) -> String {
-    let is_plain = |sign: char| sign.is_alphanumeric() || "-_.+=, ".contains(sign);
+pub(crate) fn plain(name: &str) -> String {
+    // Accents may be signs of their own.
+    let is_plain = |sign: char| match sign.is_ascii() {
+        true => sign.is_alphanumeric() || "-_.+=, ".contains(sign),
+        false => !is_obeyed(sign),
+    };
     let signs = name.char_indices().take_while(|(at, sign)| at + sign.len_utf8() <= LONGEST_STEM);
     let name: String = signs.map(|(_, sign)| if is_plain(sign) { sign } else { '_' }).collect();
     name.trim_end_matches([' ', '.']).into()
 }
 
 /// Returns a file as an argument of a command that a shell reads.
-fn as_argument(file: &Path) -> String {
+pub(crate) fn as_argument(file: &Path) -> String {
     let name = file.display().to_string();
     quoted(&if name.starts_with('-') { format!("./{name}") } else { name })
 }

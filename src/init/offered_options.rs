@@ -3,7 +3,7 @@
 use crate::init::draft::{Draft, NeededLine};
 use job::plan::job_plan::Plan;
 use job::preflight::check::{Preflight, inspect};
-use points::FileFormat;
+use points::{FileFormat, is_url};
 use std::path::Path;
 use sys::Result;
 
@@ -23,7 +23,7 @@ impl OfferedOptions {
     /// [`sys::Error::Broken`] if the program does not take what is written.
     pub(crate) fn of(draft: &Draft, preflight: &Preflight, plan: &Plan) -> Result<OfferedOptions> {
         let shares = preflight.surface_sample;
-        let has_ground = shares.ground > 0 && shares.ground < shares.points;
+        let has_ground = shares.ground > 0 && shares.ground < shares.points && !draft.sets("surface");
         // The rows of a text have to have a class that can be read. Other files have nothing else.
         let is_text = |source: FileFormat| source == FileFormat::Text;
         let has_text = plan.inputs.iter().any(|input| is_text(input.source.format));
@@ -40,7 +40,7 @@ impl OfferedOptions {
 fn is_taken(draft: &Draft, key: &'static str, value: &str, file: Option<&Path>) -> Result<bool> {
     let mut options = draft.with([NeededLine::of_input(key, value, "")]).options()?;
     if let Some(file) = file.and_then(Path::to_str) {
-        options.input.files = vec![glob::Pattern::escape(file)];
+        options.input.files = vec![if is_url(file) { file.into() } else { glob::Pattern::escape(file) }];
     }
     Ok(inspect(&options).is_ok())
 }

@@ -52,7 +52,8 @@ pub(crate) fn with_way_out(error: Error) -> Error {
     )
 }
 
-fn with_more(error: Error, more: &str) -> Error {
+/// Returns the error with more advice, if it has some.
+pub(crate) fn with_more(error: Error, more: &str) -> Error {
     match error {
         Error::System(sys::Error::Input { path, what }) => sys::Error::Input { path, what: what + more }.into(),
         Error::System(sys::Error::Config(what)) => sys::Error::Config(what + more).into(),

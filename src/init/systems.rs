@@ -78,10 +78,15 @@ impl CrsAttempts {
             CrsAttempt::Utm { close } => {
                 let utm = NeededLine::of_input("to_crs", "utm", &self.why_utm());
                 let close = close.then(|| NeededLine::of_input("datums", "close", WHY_CLOSE));
-                [Some(utm), self.missing_crs(), close].into_iter().flatten().collect()
+                self.open_lines([Some(utm), self.missing_crs(), close])
             }
-            CrsAttempt::Plane => vec![NeededLine::of_input("crs", "none", &self.why_plane())],
+            CrsAttempt::Plane => self.open_lines([Some(NeededLine::of_input("crs", "none", &self.why_plane()))]),
         }
+    }
+
+    /// Returns the lines whose keys the user has not set.
+    fn open_lines(&self, lines: impl IntoIterator<Item = Option<NeededLine>>) -> Vec<NeededLine> {
+        lines.into_iter().flatten().filter(|line| !self.draft.sets(line.key)).collect()
     }
 
     fn why_utm(&self) -> String {
@@ -117,6 +122,9 @@ impl CrsAttempts {
 
     /// Returns the line for texts whose columns are longitude and latitude of no named system, if all files that name none are such.
     fn missing_crs(&self) -> Option<NeededLine> {
+        if self.draft.sets("crs") {
+            return None;
+        }
         let mut nameless = self.sources.iter().filter(|source| !source.crs.is_named());
         let first = nameless.next()?;
         let are_degrees = first.crs.horizontal == Unit::Degree && nameless.all(|s| s.crs.horizontal == Unit::Degree);

@@ -6,9 +6,14 @@ use job::preflight::check::check;
 use std::fs;
 use sys::ErrorKind;
 
+/// Asks for a configuration for these clouds.
+fn of(clouds: &[PathBuf]) -> ConfigRequest {
+    ConfigRequest { clouds: clouds.to_vec(), ..ConfigRequest::default() }
+}
+
 /// Makes the configuration of the clouds in `folder`.
 fn made(folder: &Path) -> NewConfiguration {
-    init(&[folder.to_path_buf()], &folder.join("job.toml"), true).unwrap()
+    init(&of(&[folder.to_path_buf()]), &folder.join("job.toml"), true).unwrap()
 }
 
 /// Returns the text with each of its options on in turn. Options that follow a table of their own belong to it.
@@ -119,7 +124,7 @@ fn what_is_needed_stands_there_with_its_reason() {
     fs::write(folder.path().join("a.csv"), format!("{rows}11.5x,48,1\n")).unwrap();
     fs::write(folder.path().join("b.csv"), "version https://git-lfs.github.com/spec/v1\n").unwrap();
     let files = ["a.csv", "b.csv"].map(|name| folder.path().join(name));
-    let new = init(&files, &folder.path().join("job.toml"), true).unwrap();
+    let new = init(&of(&files), &folder.path().join("job.toml"), true).unwrap();
     let keys: Vec<&str> = new.needed.iter().map(|line| line.key).collect();
     assert_eq!(keys, ["to_crs", "missing_crs"]);
     // Whether points may be lost, the user decides.
@@ -149,7 +154,7 @@ fn a_folder_in_which_something_else_is_keeps_it() {
         fs::write(path, "{}").unwrap();
         assert!(made(folder.path()).text.contains(&format!("\ndirectory = \"{directory}\"\n")), "{in_the_way}");
     }
-    let east = init(&[folder.path().to_path_buf()], &folder.path().join("east.toml"), false).unwrap();
+    let east = init(&of(&[folder.path().to_path_buf()]), &folder.path().join("east.toml"), false).unwrap();
     assert!(east.text.contains("directory = \"out-east\""), "{}", east.text);
 }
 

@@ -69,6 +69,7 @@ fn the_full_configuration_shows_every_option_with_its_default() {
 #[test]
 fn wrong_configurations_are_refused_with_the_line_number() {
     let folder = folder_with_cloud();
+    fs::create_dir(folder.path().join("empty")).unwrap();
     for (from, to, words) in [
         ("files", "fils", &["line 2", "fils"][..]),
         ("[\"cloud.csv\"]", "3", &["line 2", "sequence"]),
@@ -96,7 +97,7 @@ fn wrong_configurations_are_refused_with_the_line_number() {
         ("\"out\"", "\"out", &["line 4", "string"]),
         ("[\"cloud.csv\"]", "[]", &["files is empty"]),
         ("[\"cloud.csv\"]", "[\"no such *.laz\"]", &["no such *.laz"]),
-        ("[\"cloud.csv\"]", "[\".\"]", &["[input] files"]),
+        ("[\"cloud.csv\"]", "[\"empty\"]", &["[input] files: ", "empty has no point clouds"]),
         ("[\"cloud.csv\"]", "[\"a[\"]", &["a["]),
     ] {
         fs::write(folder.path().join("job.toml"), LEAST.replacen(from, to, 1)).unwrap();
@@ -112,7 +113,7 @@ fn a_command_line_without_a_readable_configuration_is_refused() {
     gdt_batch(folder.path(), &["no.toml"]).refused(2, &["no configuration file no.toml"]);
     fs::write(folder.path().join("old.toml"), b"[input]\nfiles = [\"Stra\xdfe.laz\"]\n").unwrap();
     gdt_batch(folder.path(), &["old.toml"]).refused(2, &["old.toml: line 2 has the byte 0xdf, which is not UTF-8"]);
-    gdt_batch(folder.path(), &["."]).refused(2, &["cannot read the configuration"]);
+    gdt_batch(folder.path(), &["check", "."]).refused(2, &["cannot read the configuration"]);
     fs::write(folder.path().join("binary.toml"), [0xff, 0xfe, 0x00]).unwrap();
     gdt_batch(folder.path(), &["binary.toml"]).refused(2, &["binary.toml"]);
     gdt_batch(folder.path(), &["--no-such-option"]).refused(2, &["--no-such-option"]);

@@ -56,6 +56,7 @@ mod messages;
 #[cfg(unix)]
 mod names;
 mod nodata;
+mod one_command;
 mod overlap;
 mod parts;
 mod preflight;

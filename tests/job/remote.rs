@@ -64,6 +64,24 @@ fn results(report: &Value) -> &Value {
     &report["file_list"]
 }
 
+/// A job without a configuration, whose results have the name of the file. Its query is written to no configuration.
+#[test]
+fn a_url_on_the_command_line_is_a_point_cloud() {
+    let (server, folder) = (WebServer::of(&files()), tempfile::tempdir().unwrap());
+    let (url, root) = (server.url("/a/cloud.copc.laz"), folder.path());
+    let expected = Job::on(&[&url]).report();
+    let report = gdt_batch(root, &[&url, "--json", "--quiet"]).succeeded().json();
+    assert_eq!(results(&report), results(&expected));
+    assert!(root.join("cloud-terrain/tileset.json").is_file());
+    gdt_batch(root, &[&url, "--write-config", "job.toml"]).succeeded();
+    assert!(fs::read_to_string(root.join("job.toml")).unwrap().contains(&format!("files = [\"{url}\"]")));
+    let said = gdt_batch(root, &[&format!("{url}?key=SECRET"), "--write-config", "other.toml"]);
+    said.refused(2, &["the query of this URL may be a secret"]);
+    assert!(!said.err.contains("SECRET") && !root.join("other.toml").exists(), "{}", said.err);
+    let said = gdt_batch(root, &[&format!("{url}?key=SECRET"), "-o", "secret"]).succeeded();
+    assert!(!format!("{said:?}").contains("SECRET") && root.join("secret/tileset.json").is_file());
+}
+
 #[test]
 fn results_are_those_of_local_files() {
     let (server, folder) = (WebServer::of(&files()), tempfile::tempdir().unwrap());

@@ -27,7 +27,7 @@ pub fn is_by_url(name: &str) -> bool {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputOptions {
-    /// Paths or globs, relative to the configuration file, or URLs, with dots in place of their queries.
+    /// Paths, folders or globs, relative to the configuration file, or URLs, with dots in place of their queries.
     pub files: Vec<String>,
     /// Which surface the job makes: a choice of classes or returns.
     #[serde(default)]

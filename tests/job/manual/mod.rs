@@ -9,7 +9,7 @@ mod messages;
 mod run;
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
@@ -54,13 +54,18 @@ fn every_command_in_the_text_is_one() {
 /// Tells whether this is a command, or the beginning of one.
 fn is_command(text: &str) -> bool {
     match Cli::try_parse_from(text.split(' ')) {
-        Ok(Cli { command: None, config: Some(config), .. }) => config.extension().is_some_and(|e| e == "toml"),
+        // An ending tells a file from a mistyped command.
+        Ok(Cli { command: None, files, .. }) => files.iter().all(|file| file.extension().is_some() || is_folder(file)),
         Ok(_) => true,
         Err(error) => matches!(
             error.kind(),
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion | ErrorKind::MissingRequiredArgument
         ),
     }
+}
+
+fn is_folder(path: &Path) -> bool {
+    path.to_str().is_some_and(|path| path.ends_with('/'))
 }
 
 #[test]

@@ -1,50 +1,85 @@
 //! The input files: which ones the options name, and what their headers say.
 
+use crate::plan::folder_files::{FolderClouds, FolderFiles};
 use crate::plan::input_identity::place;
 use crate::plan::job_plan::SkippedInput;
-use crate::plan::named_files::files_of;
+use crate::plan::named_files::files_or_folders_of;
 use points::options::{InputOptions, OnBadFile};
 use points::{FileFormat, RowChoice, Source, is_url, open_chosen, remote_files};
 use rayon::prelude::*;
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use sys::{Error, Result};
 
 /// What messages call the option.
 const FILES: &str = "[input] files";
 
-/// Returns the files that the options name, in their order, each once: two paths that lead to the same file count as one.
+/// The files that the options name.
+#[derive(Debug, Default)]
+pub struct NamedInputs {
+    /// In their order, each once: two paths that lead to the same file count as one.
+    pub paths: Vec<PathBuf>,
+    /// What the user should know about files of folders that were left out.
+    pub notes: Vec<String>,
+}
+
+/// Returns the files that the options name. An entry that is a folder stands for the point clouds in it.
 ///
 /// # Errors
-/// [`Error::Config`] if a pattern names none, [`Error::Io`] if a folder cannot be read.
-pub fn input_paths(options: &InputOptions) -> Result<Vec<PathBuf>> {
-    let (mut paths, mut known) = (Vec::new(), HashSet::new());
-    for pattern in &options.files {
-        let found = if is_url(pattern) { remote_files(pattern)? } else { files_of(pattern, FILES)? };
-        if found.is_empty() {
-            return Err(Error::Config(format!("{FILES}: {}", nothing_at(pattern))));
+/// [`Error::Config`] if an entry names none, [`Error::Io`] if a folder cannot be read.
+pub fn named_inputs(options: &InputOptions) -> Result<NamedInputs> {
+    let (mut named, mut known) = (NamedInputs::default(), HashSet::new());
+    for entry in &options.files {
+        let FolderClouds { clouds, notes } = files_of_entry(entry, options)?;
+        if clouds.is_empty() {
+            return Err(Error::Config(format!("{FILES}: there is no file {entry}")));
         }
         // Paths with a double slash are one path, and URLs are two.
-        paths.extend(found.into_iter().filter(|path| known.insert(place(path).into_os_string())));
+        named.paths.extend(clouds.into_iter().filter(|path| known.insert(place(path).into_os_string())));
+        named.notes.extend(notes);
     }
-    Ok(paths)
+    Ok(named)
 }
 
-fn nothing_at(pattern: &str) -> String {
-    if Path::new(pattern).is_dir() {
-        let folder = pattern.trim_end_matches('/');
-        format!("{pattern} is a directory; name the files in it, for example {folder}/*.laz")
-    } else {
-        format!("there is no file {pattern}")
+/// Returns the paths of [`named_inputs`].
+///
+/// # Errors
+/// As [`named_inputs`].
+pub fn input_paths(options: &InputOptions) -> Result<Vec<PathBuf>> {
+    named_inputs(options).map(|named| named.paths)
+}
+
+fn files_of_entry(entry: &str, options: &InputOptions) -> Result<FolderClouds> {
+    if is_url(entry) {
+        return Ok(FolderClouds { clouds: remote_files(entry)?, notes: Vec::new() });
+    }
+    let (files, folders) = files_or_folders_of(entry, FILES)?;
+    let mut found = FolderClouds { clouds: files, notes: Vec::new() };
+    for folder in folders {
+        let of_folder = FolderFiles::of(&folder).and_then(|files| files.clouds(&options.csv)).map_err(of_option)?;
+        found.clouds.extend(of_folder.clouds);
+        found.notes.extend(of_folder.notes);
+    }
+    Ok(found)
+}
+
+/// Returns the error with the option that it is about.
+fn of_option(error: Error) -> Error {
+    match error {
+        Error::Config(what) => Error::Config(format!("{FILES}: {what}")),
+        error => error,
     }
 }
 
-/// Opens all inputs, for the rows of `choice` in texts. Where bad files are to be left out, returns them apart.
+/// Opens the inputs at `paths`, for the rows of `choice` in texts. Where bad files are to be left out, returns them apart.
 ///
 /// # Errors
 /// [`Error::Input`] if a file is bad and must not be left out, [`Error::Io`] if one cannot be read.
-pub fn open_all(options: &InputOptions, choice: &RowChoice) -> Result<(Vec<Source>, Vec<SkippedInput>)> {
-    let paths = input_paths(options)?;
+pub fn open_all(
+    paths: &[PathBuf],
+    options: &InputOptions,
+    choice: &RowChoice,
+) -> Result<(Vec<Source>, Vec<SkippedInput>)> {
     let opened: Vec<Result<Source>> = paths.par_iter().map(|path| open_chosen(path, &options.csv, choice)).collect();
     let (mut sources, mut skipped) = (Vec::with_capacity(opened.len()), Vec::new());
     for source in opened {

@@ -13,7 +13,7 @@ use crate::plan::flat_points::flat_points;
 use crate::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of_geocentric};
 use crate::plan::ground_triangles::GroundTriangles;
 use crate::plan::height_range::HeightSample;
-use crate::plan::inputs::{check_missing_records, open_all};
+use crate::plan::inputs::{check_missing_records, named_inputs, open_all};
 use crate::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::plan::lattice_choice::{LatticeCoarsening, LatticeRequest, choose_lattice, fineness};
 use crate::plan::measured_inputs::measured_claims;
@@ -54,8 +54,14 @@ const MAX_WARNINGS: usize = 50;
 pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> crate::Result<Plan> {
     refuse_contradicting_options(options)?;
     set_network_memory(network_memory(options));
-    let (sources, skipped) = open_all(&options.input, &row_choice(options))?;
-    plan_sources(sources, skipped, options, coarsening)
+    let named = named_inputs(&options.input)?;
+    let (sources, skipped) = open_all(&named.paths, &options.input, &row_choice(options))?;
+    let mut plan = plan_sources(sources, skipped, options, coarsening)?;
+    let mut notes = Warnings::default();
+    notes.extend(named.notes);
+    notes.shorten(MAX_WARNINGS);
+    plan.warnings.extend(notes);
+    Ok(plan)
 }
 
 /// Tells whether points lie so far from all others that they are mistakes, though no header claims them: whether a plan that looks at all

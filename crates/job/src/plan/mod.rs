@@ -12,6 +12,7 @@ pub mod extent;
 pub(crate) mod far_points;
 pub mod fingerprint;
 pub(crate) mod flat_points;
+pub mod folder_files;
 pub(crate) mod geocentric_inputs;
 pub(crate) mod globe_system;
 pub mod ground_triangles;

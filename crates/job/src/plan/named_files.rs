@@ -23,15 +23,26 @@ enum Step {
 /// # Errors
 /// [`Error::Config`] if it is no pattern or matches what is no file, [`Error::Io`] if a folder cannot be read.
 pub(crate) fn files_of(pattern: &str, option: &str) -> Result<Vec<PathBuf>> {
+    files_or_folders_of(pattern, option).map(|(files, _)| files)
+}
+
+/// As [`files_of`]. Where no file matches, also returns the folders that do.
+///
+/// # Errors
+/// As [`files_of`].
+pub(crate) fn files_or_folders_of(pattern: &str, option: &str) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let refused = |what| match what {
         Error::Config(what) => Error::Config(format!("{option}: {what}")),
         error => error,
     };
-    let mut files = paths_like(pattern).map_err(refused)?;
-    files.retain(|path| !pattern.ends_with(is_separator) && !current_if_empty(path).is_dir());
+    let (mut folders, mut files): (Vec<PathBuf>, Vec<PathBuf>) =
+        paths_like(pattern).map_err(refused)?.into_iter().partition(|path| current_if_empty(path).is_dir());
+    // A separator at the end means a folder.
+    files.retain(|_| !pattern.ends_with(is_separator));
+    folders.retain(|_| files.is_empty());
     match files.iter().find_map(|path| not_a_file(path)) {
         Some(what) => Err(Error::Config(format!("{option}: {what}"))),
-        None => Ok(files),
+        None => Ok((files, folders)),
     }
 }
 
@@ -147,7 +158,8 @@ fn entries_of(path: &Path) -> Result<Vec<(OsString, bool)>> {
     Ok(entries)
 }
 
-fn current_if_empty(path: &Path) -> &Path {
+/// Returns a path that the system knows: an empty one is the current folder.
+pub(crate) fn current_if_empty(path: &Path) -> &Path {
     if path.as_os_str().is_empty() { Path::new(".") } else { path }
 }
 

@@ -1,0 +1,99 @@
+//! The flags of a job without a configuration: each stands for a key of one.
+
+use crate::cloud_job::options::{Bounds, CloudOptions};
+use crate::config;
+use crate::init::NeededLine;
+use std::path::Path;
+use sys::{Error, Result};
+use toml::Value;
+
+/// A flag, and the key that it stands for.
+pub(crate) struct Flag {
+    name: &'static str,
+    table: &'static str,
+    key: &'static str,
+    /// Returns the value of the key, if the flag is given.
+    value: fn(&CloudOptions) -> Option<Value>,
+}
+
+/// The flags that are lines of a configuration, apart from `--output`.
+const FLAGS: [Flag; 8] = [
+    Flag { name: "surface", table: "input", key: "surface", value: |given| text(&given.surface) },
+    Flag {
+        name: "bounds",
+        table: "input",
+        key: "bounds",
+        value: |given| given.bounds.map(|Bounds(sides)| list(sides)),
+    },
+    Flag { name: "crs", table: "input", key: "crs", value: |given| text(&given.crs) },
+    Flag { name: "to-crs", table: "input", key: "to_crs", value: |given| text(&given.to_crs) },
+    Flag { name: "unit", table: "input", key: "unit", value: |given| text(&given.unit) },
+    Flag { name: "on-bad-file", table: "input", key: "on_bad_file", value: |given| text(&given.on_bad_file) },
+    Flag { name: "max-error", table: "output", key: "max_error", value: |given| given.max_error.map(Value::Float) },
+    Flag { name: "raster", table: "output", key: "raster", value: |given| given.raster.map(raster) },
+];
+
+/// `--output`, which is a path and no value.
+const OUTPUT: Flag = Flag { name: "output", table: "output", key: "directory", value: |_| None };
+
+fn text(given: &Option<String>) -> Option<Value> {
+    given.as_deref().map(Value::from)
+}
+
+fn list(sides: [f64; 4]) -> Value {
+    sides.to_vec().into()
+}
+
+fn raster(resolution: f64) -> Value {
+    toml::Table::from_iter([("resolution".to_string(), Value::Float(resolution))]).into()
+}
+
+impl Flag {
+    /// Returns all flags that stand for a key.
+    pub(crate) fn all() -> impl Iterator<Item = &'static Flag> {
+        [&OUTPUT].into_iter().chain(&FLAGS)
+    }
+
+    /// Returns the flag as the command line has it.
+    pub(crate) fn name(&self) -> String {
+        format!("--{}", self.name)
+    }
+
+    /// Returns what messages call the key.
+    pub(crate) fn option(&self) -> String {
+        format!("[{}] {}", self.table, self.key)
+    }
+}
+
+/// Returns the lines that the flags stand for.
+///
+/// # Errors
+/// [`Error::Config`] names the flag whose value is wrong.
+pub(crate) fn lines(options: &CloudOptions) -> Result<Vec<NeededLine>> {
+    let given = FLAGS.iter().filter_map(|flag| Some((flag, (flag.value)(options)?)));
+    let line = |(flag, value): (&Flag, Value)| match config::check_value(flag.table, flag.key, &value) {
+        Ok(()) => Ok(NeededLine::chosen(flag.table, flag.key, &value)),
+        Err(what) => Err(Error::Config(format!("{}: {what}", flag.name()))),
+    };
+    given.map(line).collect()
+}
+
+/// Refuses flags of point clouds beside the configuration at `path`, which has keys for them.
+///
+/// # Errors
+/// [`Error::Config`] names the flag and the key.
+pub fn refuse_beside_configuration(options: &CloudOptions, path: &Path) -> Result<()> {
+    let path = path.display();
+    if options.write_config.is_some() {
+        return Err(Error::Config(format!(
+            "--write-config is for point clouds, and {path} is a configuration already"
+        )));
+    }
+    let output = options.output.as_ref().map(|_| &OUTPUT);
+    match output.or_else(|| FLAGS.iter().find(|flag| (flag.value)(options).is_some())) {
+        Some(flag) => {
+            Err(Error::Config(format!("{} is for point clouds: set {} in {path}", flag.name(), flag.option())))
+        }
+        None => Ok(()),
+    }
+}
