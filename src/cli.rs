@@ -87,7 +87,7 @@ pub enum CliCommand {
     /// Reads headers and a sample of the points, and all of a text. Sets what the job needs, such as to_crs for degrees, and says why in
     /// a comment. If no configuration makes a job of the clouds, the message and the exit code are those of `check`.
     Init {
-        /// Point clouds, folders, or patterns such as "clouds/*.laz". Default: the point clouds in the current folder.
+        /// Point clouds: files, folders, patterns such as "clouds/*.laz", URLs. Default: the point clouds in the current folder.
         files: Vec<PathBuf>,
         /// The configuration to write; - for standard output.
         #[arg(long, short, value_name = "FILE", default_value = "job.toml")]

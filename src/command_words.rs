@@ -1,10 +1,12 @@
 //! What the words of a command line mean that has no command: the configuration of a job, or point clouds.
 
+use crate::config::nearest::nearest;
 use crate::init::is_configuration;
+use crate::shell_word::quoted;
 use job::plan::folder_files::{LASER, TEXT};
 use points::is_url;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, is_separator};
 use sys::path_text::is_pattern;
 use sys::{Error, Result};
 
@@ -25,6 +27,7 @@ pub enum Named<'a> {
 /// # Errors
 /// [`Error::Config`] if they name something of both kinds, more than one configuration, or a command at the wrong place.
 pub fn named<'a>(words: &'a [PathBuf], commands: &[String]) -> Result<Named<'a>> {
+    check_first_word(words, commands)?;
     let later = words.iter().skip(1).filter(|word| !word.exists()).filter_map(|word| word.to_str());
     if let Some(command) = later.into_iter().find(|word| commands.iter().any(|command| command == word)) {
         return Err(Error::Config(format!(
@@ -46,6 +49,20 @@ pub fn named<'a>(words: &'a [PathBuf], commands: &[String]) -> Result<Named<'a>>
     }
 }
 
+/// Fails if the first word is none of a file, and rather a mistyped command.
+fn check_first_word(words: &[PathBuf], commands: &[String]) -> Result<()> {
+    let [first, others @ ..] = words else { return Ok(()) };
+    let is_word = |word: &&str| word.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-');
+    let Some(word) = first.to_str().filter(is_word).filter(|_| first.symlink_metadata().is_err()) else {
+        return Ok(());
+    };
+    let others: String = others.iter().map(|word| format!(" {}", quoted(&word.display().to_string()))).collect();
+    Err(Error::Config(match nearest(word, commands.iter().map(String::as_str)) {
+        Some(command) => format!("there is no file {word}; did you mean the command `gdt-batch {command}{others}`?"),
+        None => format!("there is no file {word}, and no command of this name: `gdt-batch --help` lists the commands"),
+    }))
+}
+
 /// Tells whether a word that stands alone is the configuration of a job: a file `.toml`, or any other text that is not called like a point
 /// cloud.
 fn may_be_configuration(word: &Path) -> bool {
@@ -57,7 +74,22 @@ fn may_be_configuration(word: &Path) -> bool {
         Ok(data) if !data.is_file() => true,
         Ok(_) if is_called(word, &TEXT) => is_text_of_configuration(word),
         Ok(_) => is_text(word),
-        Err(_) => !is_called(word, &TEXT) && !word.to_str().is_some_and(is_pattern),
+        Err(_) => {
+            !is_called(word, &TEXT)
+                && !word.to_str().is_some_and(|name| is_pattern(name) || name.ends_with(is_separator))
+        }
+    }
+}
+
+/// Returns the error about a configuration with what to do if it was to be a point cloud.
+pub fn with_endings_of_clouds(error: Error, word: &Path) -> Error {
+    match error {
+        Error::Config(what) if word.is_file() && !is_called(word, &[TOML]) => Error::Config(format!(
+            "{what}\n{} is read as a configuration; a text of points ends in .{}",
+            word.display(),
+            TEXT.join(", .")
+        )),
+        error => error,
     }
 }
 
@@ -118,7 +150,6 @@ mod tests {
             ("JOB.TOML", true),
             ("job.txt", true),
             ("job", true),
-            ("no", true),
             ("points.dat", true),
             ("points.txt", false),
             ("no.txt", false),
@@ -134,6 +165,17 @@ mod tests {
             assert_eq!(kind(root.path(), &[name]) == "configuration", is_configuration, "{name}");
         }
         assert_eq!(kind(root.path(), &["cloud.las", "points.dat", "no"]), "clouds");
+    }
+
+    #[test]
+    fn a_word_that_is_no_file_may_be_a_mistyped_command() {
+        let told = |words: &[&str]| {
+            let words: Vec<PathBuf> = words.iter().map(PathBuf::from).collect();
+            named(&words, &["check".into(), "verify".into()]).unwrap_err().to_string()
+        };
+        assert!(told(&["chek", "my job.toml"]).ends_with("did you mean the command `gdt-batch check 'my job.toml'`?"));
+        assert!(told(&["verfy"]).contains("`gdt-batch verify`"));
+        assert!(told(&["nothing-like-it"]).contains("no command of this name"));
     }
 
     #[test]

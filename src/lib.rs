@@ -5,6 +5,7 @@
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 pub mod cli;
+pub mod cli_advice;
 pub mod cloud_job;
 pub mod command_words;
 pub mod completions;

@@ -4,6 +4,7 @@
 
 use clap::{CommandFactory, Parser};
 use gdt_batch::cli::{Cli, CliCommand, PrintOptions, ViewOptions};
+use gdt_batch::cli_advice::with_advice;
 use gdt_batch::cloud_job::{self, CloudJob};
 use gdt_batch::command_words::{self, Named};
 use gdt_batch::error::{Error, Result};
@@ -45,7 +46,7 @@ fn main() -> ExitCode {
 
 /// Returns what the command line says. If it is wrong, ends the process with code 2, as clap does.
 fn command_line() -> Cli {
-    Cli::try_parse().unwrap_or_else(|error| {
+    Cli::try_parse().map_err(with_advice).unwrap_or_else(|error| {
         let has_signs = std::env::args_os().any(|word| word.to_string_lossy().chars().any(char::is_control));
         if error.use_stderr() && has_signs {
             say(&error.render().to_string());
@@ -57,6 +58,9 @@ fn command_line() -> Cli {
 
 fn run(cli: Cli) -> Result<ExitCode> {
     let print = cli.print;
+    if cli.command.is_some() {
+        cloud_job::refuse_beside_command(&cli.clouds)?;
+    }
     match (&cli.command, &cli.files[..]) {
         (Some(_), [first, ..]) => {
             let first = first.display();
@@ -129,7 +133,7 @@ fn command_names() -> Vec<String> {
 fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
     cloud_job::refuse_beside_configuration(&cli.clouds, path)?;
     let options = run_options(cli);
-    let config = config::load(path)?;
+    let config = config::load(path).map_err(|error| command_words::with_endings_of_clouds(error, path))?;
     interrupt::listen(exit_code)?;
     show_report(&job::run(&config, options)?, &config, cli.print)
 }

@@ -1,6 +1,7 @@
 //! The man page, made from the definition of the command line.
 
 use crate::cli::Cli;
+use crate::config::nearest::nearest;
 use clap::{Command, CommandFactory};
 use clap_mangen::Man;
 use roff::{Roff, roman};
@@ -27,8 +28,11 @@ pub fn man(command: Option<&str>) -> Result<String> {
             Some(command) => page_of(command.clone()).render(&mut page),
             None => {
                 let names: Vec<&str> = shown(&all).map(Command::get_name).collect();
-                let names = names.join(", ");
-                return Err(Error::Config(format!("there is no command {name}: the commands are {names}")));
+                let meant = match nearest(name, names.iter().copied()) {
+                    Some(near) => format!("; did you mean {near}?"),
+                    None => format!(": the commands are {}", names.join(", ")),
+                };
+                return Err(Error::Config(format!("there is no command {name}{meant}")));
             }
         },
     };
@@ -170,6 +174,8 @@ mod tests {
     #[test]
     fn a_command_that_there_is_not_is_refused_with_those_that_there_are() {
         let what = man(Some("chek")).unwrap_err().to_string();
-        assert!(what.contains("no command chek") && what.contains("check"), "{what}");
+        assert!(what.contains("no command chek; did you mean check?"), "{what}");
+        let what = man(Some("sing")).unwrap_err().to_string();
+        assert!(what.contains("no command sing: ") && what.contains("verify"), "{what}");
     }
 }

@@ -71,11 +71,37 @@ impl Flag {
 /// [`Error::Config`] names the flag whose value is wrong.
 pub(crate) fn lines(options: &CloudOptions) -> Result<Vec<NeededLine>> {
     let given = FLAGS.iter().filter_map(|flag| Some((flag, (flag.value)(options)?)));
-    let line = |(flag, value): (&Flag, Value)| match config::check_value(flag.table, flag.key, &value) {
+    let line = |(flag, value): (&Flag, Value)| match config::check_value(&format!("[{}]", flag.table), flag.key, &value)
+    {
         Ok(()) => Ok(NeededLine::chosen(flag.table, flag.key, &value)),
         Err(what) => Err(Error::Config(format!("{}: {what}", flag.name()))),
     };
     given.map(line).collect()
+}
+
+/// Returns what messages call the key for which a flag such as `--surface` stands.
+pub(crate) fn option_of_flag(flag: &str) -> Option<String> {
+    Flag::all().find(|known| known.name() == flag).map(Flag::option)
+}
+
+/// Refuses flags of point clouds beside a command.
+///
+/// # Errors
+/// [`Error::Config`] names the flag.
+pub fn refuse_beside_command(options: &CloudOptions) -> Result<()> {
+    let writes = options.write_config.as_ref().map(|_| "--write-config".to_string());
+    match given(options).map(Flag::name).or(writes) {
+        Some(name) => {
+            Err(Error::Config(format!("{name} is for point clouds, as in gdt-batch cloud.laz: no command takes it")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Returns a flag that is given and stands for a key.
+fn given(options: &CloudOptions) -> Option<&'static Flag> {
+    let output = options.output.as_ref().map(|_| &OUTPUT);
+    output.or_else(|| FLAGS.iter().find(|flag| (flag.value)(options).is_some()))
 }
 
 /// Refuses flags of point clouds beside the configuration at `path`, which has keys for them.
@@ -89,8 +115,7 @@ pub fn refuse_beside_configuration(options: &CloudOptions, path: &Path) -> Resul
             "--write-config is for point clouds, and {path} is a configuration already"
         )));
     }
-    let output = options.output.as_ref().map(|_| &OUTPUT);
-    match output.or_else(|| FLAGS.iter().find(|flag| (flag.value)(options).is_some())) {
+    match given(options) {
         Some(flag) => {
             Err(Error::Config(format!("{} is for point clouds: set {} in {path}", flag.name(), flag.option())))
         }

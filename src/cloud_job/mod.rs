@@ -15,7 +15,8 @@ use job::{Error, Result};
 use std::path::{Path, PathBuf};
 use sys::threads::{available, on_threads};
 
-pub use crate::cloud_job::flags::refuse_beside_configuration;
+pub(crate) use crate::cloud_job::flags::option_of_flag;
+pub use crate::cloud_job::flags::{refuse_beside_command, refuse_beside_configuration};
 pub use crate::cloud_job::options::CloudOptions;
 
 /// Point clouds, and what the command line says of their job.

@@ -1,5 +1,7 @@
 //! The flags of a job without a configuration, as the command line has them.
 
+use crate::config;
+use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueHint};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -9,35 +11,40 @@ use std::str::FromStr;
 #[command(next_help_heading = "Options for point clouds")]
 pub struct CloudOptions {
     /// The output directory. Default: the name of the file or the folder with -terrain, in the current folder.
-    #[arg(long, short, value_name = "DIR", value_hint = ValueHint::DirPath, requires = "files")]
+    #[arg(long, short, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub output: Option<PathBuf>,
-    /// The surface to make: all, ground (bare earth), first (roofs and tree tops) or last.
-    #[arg(long, value_name = "NAME", requires = "files")]
+    /// The surface to make: ground is bare earth, first has roofs and tree tops.
+    #[arg(long, value_name = "NAME", value_parser = choice("[input]", "surface"))]
     pub surface: Option<String>,
     /// Fewer triangles: keep every point within this height of the mesh, in source units.
-    #[arg(long, value_name = "HEIGHT", value_parser = number, allow_negative_numbers = true, requires = "files")]
+    #[arg(long, value_name = "HEIGHT", value_parser = number, allow_negative_numbers = true)]
     pub max_error: Option<f64>,
     /// Also write the heights as terrain.tif, with cells of this side in source units.
-    #[arg(long, value_name = "SIDE", value_parser = number, allow_negative_numbers = true, requires = "files")]
+    #[arg(long, value_name = "SIDE", value_parser = number, allow_negative_numbers = true)]
     pub raster: Option<f64>,
     /// Keep only the points in this rectangle, in source units.
-    #[arg(long, value_name = "XMIN,YMIN,XMAX,YMAX", allow_hyphen_values = true, requires = "files")]
+    #[arg(long, value_name = "XMIN,YMIN,XMAX,YMAX", allow_hyphen_values = true)]
     pub bounds: Option<Bounds>,
     /// Transform all points into this coordinate reference system: utm, or a code such as EPSG:26915.
-    #[arg(long, value_name = "CRS", requires = "files")]
+    #[arg(long, value_name = "CRS")]
     pub to_crs: Option<String>,
     /// The coordinate reference system of all files, if they name none or a wrong one.
-    #[arg(long, value_name = "CRS", requires = "files")]
+    #[arg(long, value_name = "CRS")]
     pub crs: Option<String>,
-    /// The unit of x and y, if the files name none: metre, foot or us-foot.
-    #[arg(long, value_name = "UNIT", requires = "files")]
+    /// The unit of x and y, if the files name none.
+    #[arg(long, value_name = "UNIT", value_parser = choice("[input]", "unit"))]
     pub unit: Option<String>,
-    /// What to do about a file that is damaged or no point cloud: stop, or skip it.
-    #[arg(long, value_name = "WHAT", requires = "files")]
+    /// What to do about a file that is damaged or no point cloud: stop, or leave it out.
+    #[arg(long, value_name = "WHAT", value_parser = choice("[input]", "on_bad_file"))]
     pub on_bad_file: Option<String>,
     /// Write the configuration that these options mean, and run nothing; - for standard output.
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, requires = "files")]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub write_config: Option<PathBuf>,
+}
+
+/// Returns what reads one of the words that an option of a configuration takes.
+fn choice(table: &str, key: &str) -> PossibleValuesParser {
+    PossibleValuesParser::new(config::choices(table, key))
 }
 
 fn number(text: &str) -> Result<f64, String> {

@@ -1,60 +1,33 @@
 //! Reads configuration files: TOML in, checked options out. An unknown key, a wrong type or an impossible value is an error that
 //! shows the line.
 
+mod config_file;
+mod least;
+mod mistake;
+pub(crate) mod nearest;
+mod option_list;
 mod paths;
+mod place;
 mod short_message;
+mod syntax;
+mod wrong_name;
+mod wrong_value;
 
+use crate::config::config_file::{ConfigFile, TriangulationTable};
+use crate::config::least::refusal;
+use crate::config::mistake::explained;
+use crate::config::option_list::ConfigOption;
 use crate::config::paths::{Anchored, anchor, as_pattern};
-use crate::config::short_message::shortened;
-use delaunay_gpu::options::{GpuOptions, TextureSide, VoronoiMethod};
-use delaunay_gpu::triangulation_options::{Backend, MaxPointsPerPart, MaxPointsPerTile, TriangulationOptions};
+use crate::config::wrong_value::about_value;
+use delaunay_gpu::options::GpuOptions;
+use delaunay_gpu::triangulation_options::TriangulationOptions;
 use glob::Pattern;
-use job::options::{JobOptions, Limits};
+use job::options::JobOptions;
 use points::lines::options::LineOptions;
-use points::options::{InputOptions, is_by_url};
-use serde::Deserialize;
+use points::options::is_by_url;
 use std::path::Path;
 use sys::path_text::encoded;
 use sys::{Error, Result, Warnings};
-use tiles::options::OutputOptions;
-
-/// A configuration file as it was written.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ConfigFile {
-    input: InputOptions,
-    #[serde(default)]
-    breaklines: Vec<LineOptions>,
-    #[serde(default)]
-    triangulation: TriangulationTable,
-    #[serde(default)]
-    gpu: GpuTable,
-    output: OutputOptions,
-    #[serde(default)]
-    limits: Limits,
-}
-
-/// `[triangulation]`, with the keys that are in `[gpu]` now.
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct TriangulationTable {
-    backend: Backend,
-    #[serde(alias = "sites_per_tile")]
-    max_points_per_tile: MaxPointsPerTile,
-    max_points_per_part: MaxPointsPerPart,
-    voronoi: Option<VoronoiMethod>,
-    adapter: Option<String>,
-    texture: Option<TextureSide>,
-}
-
-/// `[gpu]`. Older configurations have these keys in `[triangulation]`.
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct GpuTable {
-    voronoi: Option<VoronoiMethod>,
-    adapter: Option<String>,
-    texture: Option<TextureSide>,
-}
 
 /// A key or a value that has a new name.
 struct Renamed {
@@ -121,20 +94,21 @@ pub(crate) fn check_directory(directory: &str, base: &Path) -> Result<()> {
     anchor("[output] directory", directory, base).map(drop).map_err(Error::Config)
 }
 
-/// Checks the value of an option.
+/// Checks the value of an option, whose table is named as a configuration has it.
 ///
 /// # Errors
 /// A sentence about what is wrong with it.
 pub(crate) fn check_value(table: &str, key: &str, value: &toml::Value) -> std::result::Result<(), String> {
-    let mut file = toml::Table::new();
-    let files = toml::Value::Array(vec!["a".into()]);
-    for (table, key, value) in [("input", "files", &files), ("output", "directory", &"a".into()), (table, key, value)] {
-        let place = file.entry(table).or_insert_with(|| toml::Table::new().into());
-        if let Some(place) = place.as_table_mut() {
-            place.insert(key.into(), value.clone());
-        }
+    match (refusal(table, key, value), ConfigOption::find(table, key)) {
+        (None, _) => Ok(()),
+        (Some(said), Some(option)) => Err(about_value(&option, Some(value), &said)),
+        (Some(said), None) => Err(said),
     }
-    file.try_into::<ConfigFile>().map(drop).map_err(|error: toml::de::Error| error.message().into())
+}
+
+/// Returns the words that an option takes, if it takes no others.
+pub(crate) fn choices(table: &str, key: &str) -> Vec<String> {
+    ConfigOption::find(table, key).map_or(Vec::new(), |option| option.choices())
 }
 
 /// Makes the paths count from the working directory instead of `base`, the directory of the configuration. URLs stay, without what nobody
@@ -203,7 +177,7 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
     if let Some(line) = text.lines().position(|line| line.contains(BRACKETS)) {
         return Err(format!("line {} has more brackets in a row than any value needs: remove them", line + 1));
     }
-    let mut file: ConfigFile = toml::from_str(text).map_err(|e| shortened(&without_queries(&e.to_string())))?;
+    let mut file: ConfigFile = toml::from_str(text).map_err(|e| without_queries(&explained(text, &e)))?;
     if let Some(place) = text.parse::<toml::Table>().ok().and_then(|table| nul_in(&table.into())) {
         return Err(format!("{place} has a NUL character (\\u0000), which no name of a file can have: remove it"));
     }

@@ -25,6 +25,11 @@ pub(crate) fn shortened(message: &str) -> String {
     message.lines().map(short).collect::<Vec<_>>().join("\n")
 }
 
+/// Returns the lines of a message that show the text and the place of the error.
+pub(crate) fn shown_lines(message: &str) -> String {
+    message.lines().filter(|line| split(line).is_some()).collect::<Vec<_>>().join("\n")
+}
+
 /// Splits a line that shows some of the text behind the bar that stands before it.
 fn split(line: &str) -> Option<(&str, &str)> {
     let (number, _) = line.split_once('|')?;

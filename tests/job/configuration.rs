@@ -72,7 +72,7 @@ fn wrong_configurations_are_refused_with_the_line_number() {
     fs::create_dir(folder.path().join("empty")).unwrap();
     for (from, to, words) in [
         ("files", "fils", &["line 2", "fils"][..]),
-        ("[\"cloud.csv\"]", "3", &["line 2", "sequence"]),
+        ("[\"cloud.csv\"]", "3", &["line 2", "[input] files takes a list of texts"]),
         ("[output]", "bounds = [9, 0, 1, 1]\n[output]", &["line 3", "xmin"]),
         (
             "[output]",
@@ -88,13 +88,13 @@ fn wrong_configurations_are_refused_with_the_line_number() {
         ("[output]", "[triangulation]\nbackend = \"cuda\"\n[output]", &["line 4", "cuda"]),
         ("[output]", "[gpu]\ntexture = 3\n[output]", &["line 4", "texture"]),
         ("[output]", "[limits]\nmemory = \"1 MiB\"\n[output]", &["line 4", "128 MiB"]),
-        ("[output]", "[limits]\nmemory = 4\n[output]", &["line 4", "string"]),
+        ("[output]", "[limits]\nmemory = 4\n[output]", &["line 4", "memory takes text", "4 GiB"]),
         ("[output]", "[limits]\nthreads = -1\n[output]", &["line 4", "threads"]),
         ("[output]", "[ouput]", &["line 3", "ouput"]),
         ("directory", "height_offset = -1e6\ndirectory", &["height_offset", "100000"]),
         ("directory", "height_offset = nan\ndirectory", &["height_offset", "100000"]),
-        ("directory", "normals = 1\ndirectory", &["line 4", "boolean"]),
-        ("\"out\"", "\"out", &["line 4", "string"]),
+        ("directory", "normals = 1\ndirectory", &["line 4", "true or false"]),
+        ("\"out\"", "\"out", &["line 4", "a text has no closing quote"]),
         ("[\"cloud.csv\"]", "[]", &["files is empty"]),
         ("[\"cloud.csv\"]", "[\"no such *.laz\"]", &["no such *.laz"]),
         ("[\"cloud.csv\"]", "[\"empty\"]", &["[input] files: ", "empty has no point clouds"]),

@@ -53,6 +53,7 @@ mod manual;
 mod many_tiles;
 mod max_error;
 mod messages;
+mod mistakes;
 #[cfg(unix)]
 mod names;
 mod nodata;

@@ -143,8 +143,8 @@ fn what_messages_quote_is_short() {
     let long = "x".repeat(300_000);
     for (text, words) in [
         (format!("[input]\nfiles = [\"{long}\"\n"), &["line 2"][..]),
-        (format!("[input]\nfiles = \"{long}\"\n"), &["line 2", "expected a sequence"]),
-        (format!("[input]\n{long} = 1\n"), &["unknown field"]),
+        (format!("[input]\nfiles = \"{long}\"\n"), &["line 2", "[input] files takes a list of texts"]),
+        (format!("[input]\n{long} = 1\n"), &["[input] has no key xxx", "it takes files, surface"]),
         (
             format!("[input]\nfiles = [\"{long}.laz\"]\n[output]\ndirectory = \"out\"\n"),
             &["there is no file", "left out"],

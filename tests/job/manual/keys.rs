@@ -11,40 +11,25 @@ const LEAST: &str = "[input]\nfiles = [\"a.laz\"]\n[output]\ndirectory = \"out\"
 pub(super) const TABLES: [&str; 8] =
     ["[input]", "[input.csv]", "[[breaklines]]", "[triangulation]", "[gpu]", "[output]", "[output.raster]", "[limits]"];
 
-/// Old names, which the manual need not explain, and one that a job sets for itself.
-const UNSAID: [(&str, &str); 7] = [
-    ("[input]", "malformed_share"),
-    ("[input]", "without_ignored_ground"),
-    ("[triangulation]", "sites_per_tile"),
-    ("[triangulation]", "voronoi"),
-    ("[triangulation]", "adapter"),
-    ("[triangulation]", "texture"),
-    ("[output]", "level_sites"),
-];
-
 /// A key and its table.
 pub(super) type Key = (String, String);
 
-/// Returns all keys that the program knows: it lists them when it is asked for one that is not there.
-pub(super) fn known() -> BTreeSet<Key> {
+/// Returns the keys that the manual has to explain: those that the program lists when it is asked for one that is not there. Old names are
+/// not among them.
+pub(super) fn to_explain() -> BTreeSet<Key> {
     let mut keys = BTreeSet::new();
     for table in TABLES {
         let said = load(table, "no_such_key", Value::Integer(1)).unwrap_err();
-        let (_, list) = said.split_once("expected one of").unwrap_or_else(|| panic!("{said}"));
-        // Some keys are tables, which have keys of their own.
-        let is_key = |key: &String| !TABLES.contains(&format!("{}.{key}]", table.trim_end_matches(']')).as_str());
-        keys.extend(super::markdown::code(list).into_iter().filter(is_key).map(|key| (table.to_owned(), key)));
+        let list =
+            said.lines().next().and_then(|line| line.split_once(": it takes ")).unwrap_or_else(|| panic!("{said}"));
+        keys.extend(list.1.split(", ").map(|key| (table.to_owned(), key.to_owned())));
     }
     keys
 }
 
-/// Returns the keys that the manual has to explain.
-pub(super) fn to_explain() -> BTreeSet<Key> {
-    let mut keys = known();
-    for (table, key) in UNSAID {
-        assert!(keys.remove(&(table.into(), key.into())), "{table} {key} is gone: UNSAID need not have it");
-    }
-    keys
+/// Tells whether the program knows a key, under whatever name.
+pub(super) fn is_known(table: &str, key: &str) -> bool {
+    load(table, key, Value::Integer(1)).err().is_none_or(|said| !said.contains("has no key"))
 }
 
 /// Reads a configuration with this key in it, as the program does.

@@ -32,7 +32,7 @@ pub fn named_inputs(options: &InputOptions) -> Result<NamedInputs> {
     for entry in &options.files {
         let FolderClouds { clouds, notes } = files_of_entry(entry, options)?;
         if clouds.is_empty() {
-            return Err(Error::Config(format!("{FILES}: there is no file {entry}")));
+            return Err(Error::Config(format!("{FILES}: there is no file {entry}{}", hint_of_escape(entry))));
         }
         // Paths with a double slash are one path, and URLs are two.
         named.paths.extend(clouds.into_iter().filter(|path| known.insert(place(path).into_os_string())));
@@ -61,6 +61,14 @@ fn files_of_entry(entry: &str, options: &InputOptions) -> Result<FolderClouds> {
         found.notes.extend(of_folder.notes);
     }
     Ok(found)
+}
+
+/// Returns what to do if a path has a character that TOML has made of a backslash and a letter, as of `"C:\temp"`.
+fn hint_of_escape(entry: &str) -> &'static str {
+    match entry.contains(['\t', '\n', '\r', '\u{8}', '\u{c}', '\u{1b}']) {
+        true => ": a backslash has a meaning of its own in double quotes; write slashes, or single quotes",
+        false => "",
+    }
 }
 
 /// Returns the error with the option that it is about.
