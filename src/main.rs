@@ -219,7 +219,7 @@ fn request(path: &Path, engine: Engine, tasks: u32, restart: bool) -> Result<Req
     // The inputs may be where only the pods of Kubernetes see them.
     let is_out_of_sight = engine == Engine::Kubernetes && !config.output.directory.exists();
     let phases = if is_out_of_sight || restart {
-        PhaseTasks::all(tasks, config.output.selects())
+        PhaseTasks::all(tasks, config.leaves_points_out())
     } else {
         job::missing_tasks(&config, tasks)?
     };

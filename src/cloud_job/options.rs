@@ -13,16 +13,16 @@ pub struct CloudOptions {
     /// The output directory. Default: the name of the file or the folder with -terrain, in the current folder.
     #[arg(long, short, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub output: Option<PathBuf>,
-    /// The surface to make: ground is bare earth, first has roofs and tree tops.
+    /// The surface to make: ground is bare earth by the classes of points, bare-earth finds the ground, first has roofs and tree tops.
     #[arg(long, value_name = "NAME", value_parser = choice("[input]", "surface"))]
     pub surface: Option<String>,
-    /// Fewer triangles: keep every point within this height of the mesh, in source units.
+    /// Fewer triangles: keep every point within this height of the mesh, in the unit of heights.
     #[arg(long, value_name = "HEIGHT", value_parser = number, allow_negative_numbers = true)]
     pub max_error: Option<f64>,
-    /// Also write the heights as terrain.tif, with cells of this side in source units.
+    /// Also write the heights as terrain.tif, with cells of this side, in the unit of x and y.
     #[arg(long, value_name = "SIDE", value_parser = number, allow_negative_numbers = true)]
     pub raster: Option<f64>,
-    /// Keep only the points in this rectangle, in source units.
+    /// Keep only the points in this rectangle, in the coordinates of the files; with --to-crs, in those of that system.
     #[arg(long, value_name = "XMIN,YMIN,XMAX,YMAX", allow_hyphen_values = true)]
     pub bounds: Option<Bounds>,
     /// Transform all points into this coordinate reference system: utm, or a code such as EPSG:26915.

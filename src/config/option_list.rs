@@ -112,7 +112,9 @@ pub(crate) fn inner_tables(table: &str) -> Vec<(&'static str, &'static str)> {
 /// Tells whether a line begins a table.
 fn is_header(line: &str) -> bool {
     let name = line.trim_matches(['[', ']']);
-    line.starts_with('[') && line.ends_with(']') && name.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'.')
+    line.starts_with('[')
+        && line.ends_with(']')
+        && name.bytes().all(|byte| byte.is_ascii_lowercase() || b"._".contains(&byte))
 }
 
 /// Returns the key, the value and the comment of a line that sets a key.
@@ -183,6 +185,7 @@ mod tests {
         }
         let tables = [
             "[input]",
+            "[input.bare_earth]",
             "[input.csv]",
             "[[breaklines]]",
             "[triangulation]",

@@ -2,6 +2,7 @@
 
 use crate::init::draft::{Draft, NeededLine, quoted};
 use crate::init::findings::{Findings, NO_UNIT_OF_HEIGHTS, rectangle, unit_of_heights};
+use crate::init::offered_options::OfferedOptions;
 use crate::init::page::Page;
 use crate::init::required_options::Runnable;
 use crs::Unit;
@@ -34,7 +35,7 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
         page.blank();
         warnings.iter().for_each(|warning| page.say(&format!("Warning: {warning}.")));
     }
-    about_surface(&mut page, &findings, draft, &sources, offers.ground);
+    about_surface(&mut page, &findings, draft, &sources, *offers);
     about_coordinates(&mut page, &findings, draft, (plan.crs.is_named(), offers.utm));
     if !draft.sets("bounds") {
         about_area(&mut page, &sources);
@@ -76,12 +77,15 @@ fn files(patterns: &[String]) -> String {
     }
 }
 
-fn about_surface(page: &mut Page, findings: &Findings, draft: &Draft, sources: &[&Source], has_ground: bool) {
+fn about_surface(page: &mut Page, findings: &Findings, draft: &Draft, sources: &[&Source], offers: OfferedOptions) {
     page.blank();
     page.say(&findings.classes);
     page.say(&findings.surface);
-    if has_ground {
+    if offers.ground {
         page.offer("surface = \"ground\"", "bare earth: only points on the ground and on water");
+    }
+    if offers.bare_earth && !draft.sets("surface") {
+        page.offer("surface = \"bare-earth\"", "bare earth: the program finds the ground, whatever the classes are");
     }
     let has_returns = sources.iter().any(|source| source.by_return.iter().skip(1).any(|count| *count > 0));
     if has_returns && !draft.sets("surface") {

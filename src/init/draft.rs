@@ -5,8 +5,8 @@ use crate::init::config_folder::ConfigFolder;
 use job::options::JobOptions;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use sys::Result;
 use sys::terminal::is_obeyed;
-use sys::{Error, Result};
 
 /// A line of the configuration that the clouds need, or the machine.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -122,7 +122,7 @@ impl Draft {
     /// Returns the options of the job, as the program reads them from the configuration once the user has taken the choices.
     ///
     /// # Errors
-    /// [`Error::Broken`] if it does not take what is written here.
+    /// [`sys::Error::Config`] if it does not take what is written here.
     pub(crate) fn options(&self) -> Result<JobOptions> {
         let lines = |table: &str| -> String {
             let lines = self.all_lines().filter(|line| line.table == table);
@@ -140,12 +140,12 @@ impl Draft {
     }
 }
 
-/// Returns the options that a configuration says which this program has written.
+/// Returns the options of a configuration that this program has written. Names of files in it are the user's.
 ///
 /// # Errors
-/// [`Error::Broken`] if the program does not take it.
+/// [`sys::Error::Config`] if the program does not take it.
 pub(crate) fn options_of(text: &str, folder: &Path) -> Result<JobOptions> {
-    config::of_text(text, folder).map_err(|error| Error::Broken(format!("the configuration of init: {error}")))
+    config::of_text(text, folder)
 }
 
 /// Returns a text as TOML has it.

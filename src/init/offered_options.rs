@@ -12,6 +12,8 @@ use sys::Result;
 pub(crate) struct OfferedOptions {
     /// `surface = "ground"`.
     pub(crate) ground: bool,
+    /// `surface = "bare-earth"`.
+    pub(crate) bare_earth: bool,
     /// `to_crs = "utm"`.
     pub(crate) utm: bool,
 }
@@ -32,7 +34,8 @@ impl OfferedOptions {
         let first = plan.inputs.iter().find(|input| input.source.own_crs().is_named()).map(|input| &*input.source.path);
         let may_be_utm = plan.crs.is_named() && !draft.sets("to_crs") && first.is_some();
         let utm = may_be_utm && is_taken(draft, "to_crs", "utm", first)?;
-        Ok(OfferedOptions { ground, utm })
+        let bare_earth = shares.ground == 0 && shares.points > 0;
+        Ok(OfferedOptions { ground, bare_earth, utm })
     }
 }
 

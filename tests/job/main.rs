@@ -24,6 +24,7 @@ mod transformed;
 mod areas_of_use;
 mod attributes;
 mod bad_files;
+mod bare_earth;
 mod breaklines;
 mod broken;
 // These take the longest. Tests begin in the order of their names, so that others run beside them.

@@ -33,7 +33,7 @@ const IN_INPUT: [(&str, &[&str]); 19] = [
     (
         "surface = \"gorund\"",
         &[
-            "line 3: [input] surface takes \"all\", \"ground\", \"first\" or \"last\"",
+            "line 3: [input] surface takes \"all\", \"ground\", \"bare-earth\", \"first\" or \"last\"",
             "did you mean surface = \"ground\"?",
         ],
     ),

@@ -202,3 +202,10 @@ fn a_run_that_was_killed_goes_on_with_the_same_command() {
         }
     }
 }
+
+#[test]
+fn a_url_that_cannot_be_read_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = gdt_batch(folder.path(), &["ftp://x/a.laz"]);
+    said.refused(2, &["files are read by https://, http:// and s3://, not by ftp://"]);
+}

@@ -103,6 +103,8 @@ fn add_jobs_of_one_part(documents: &Documents) {
     documents.run(&job);
     documents.verify(&job, &[&square], "proved");
     add_what_is_missing_or_wrong(documents, &job);
+    let bare = Job::on(&[&square]).with("input", "surface = \"bare-earth\"\nbare_earth = { slope = 0.2 }");
+    documents.run(&bare);
     let server = WebServer::of(&[("/returns.las", LasFile::new(4, 7, 0, 500).las())]);
     documents.run(
         &Job::on(&[server.url("/returns.las")])

@@ -137,7 +137,7 @@ fn a_cloud_without_ground_is_refused_with_what_it_has_and_what_to_do() {
     let words = [
         "no point is left",
         "class 1 (unclassified, 75 %), class 5 (high vegetation, 25 %)",
-        "pdal translate in.laz out.laz smrf --writers.las.forward=all",
+        "set surface = \"bare-earth\" to let the program find the ground",
     ];
     for file in [&las, &csv] {
         let job = Job::on(&[file]).with("input", "surface = \"ground\"");
@@ -172,7 +172,7 @@ fn a_text_that_lacks_the_columns_of_a_surface_is_refused() {
     let plain = rows("x,y,z", "");
     run(&plain, "surface = \"ground\"").refused(
         3,
-        &["a.csv", "surface = \"ground\"", "no column of classes", "pdal translate", "leave `surface` out"],
+        &["a.csv", "surface = \"ground\"", "no column of classes", "surface = \"bare-earth\"", "leave `surface` out"],
     );
     run(&plain, "classes = [2]").refused(2, &["classes = [2]", "no column of classes", "a.csv", "have 0 in it"]);
     run(&plain, "surface = \"first\"").refused(2, &["return_number", "a.csv"]);

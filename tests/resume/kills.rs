@@ -76,6 +76,14 @@ fn a_job_with_max_error_goes_on_where_it_was_killed() {
 }
 
 #[test]
+fn a_job_that_finds_the_ground_goes_on_where_it_was_killed() {
+    let input = "files = [\"cloud.csv\"]\nsurface = \"bare-earth\"".into();
+    let rig = small_job(&Setup { input, ..Setup::tiles_of(2_000) });
+    let kills: u64 = PLACES.iter().chain(&["ground"]).map(|place| kill_at_each(&rig, place, 4)).sum();
+    assert!(kills >= 12, "only {kills} kills");
+}
+
+#[test]
 fn a_job_killed_again_and_again_still_ends() {
     let rig = small_job(&Setup::tiles_of(3_500).threads(2));
     // Every run records a phase more than the one before.

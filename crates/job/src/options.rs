@@ -36,6 +36,11 @@ pub struct JobOptions {
 const MOST_PER_PROCESSOR: usize = 2;
 
 impl JobOptions {
+    /// Tells whether vertices are found among the points: those on the ground, or few of them.
+    pub fn leaves_points_out(&self) -> bool {
+        self.input.finds_ground() || self.output.selects()
+    }
+
     /// The number of worker threads, at most two for each processor.
     pub fn threads(&self) -> usize {
         match self.limits.threads.0 {

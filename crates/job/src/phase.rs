@@ -16,7 +16,7 @@ pub enum Phase {
     Plan,
     /// Reads the inputs that a part is the first to need.
     Read,
-    /// Selects the vertices of all parts, in a job with `[output] max_error`.
+    /// Finds the vertices of all parts among their points, in a job with `surface = "bare-earth"` or `[output] max_error`.
     Select,
     /// Triangulates a part, and writes the tiles that need no other.
     Mesh,
@@ -43,7 +43,7 @@ impl Phase {
         Phase::Publish,
     ];
 
-    /// Returns the phases of a job in their order. Only a job that selects vertices has [`Phase::Select`].
+    /// Returns the phases of a job in their order. Only a job that leaves points out of the mesh has [`Phase::Select`].
     pub fn of_job(selects: bool) -> impl Iterator<Item = Phase> {
         Phase::ALL.into_iter().filter(move |phase| selects || *phase != Phase::Select)
     }

@@ -50,6 +50,8 @@ pub enum JobStep {
     Levels,
     /// Writes the raster of heights.
     Raster,
+    /// Writes the inputs with the classes that the job has found.
+    Classified,
     /// Writes what is beside the tiles, except the raster and the report.
     Publish,
     /// Writes the report: the job is complete.
@@ -81,6 +83,8 @@ pub enum StepRecord {
     Selected,
     /// The corners of the long triangles on ground, with `max_error`.
     OnGround,
+    /// The heights of the ground that the job has found.
+    Ground,
     /// How many sites there are around every place.
     Spacing,
     /// [`LevelSummary`]
@@ -105,6 +109,7 @@ impl RecordKey for StepRecord {
             StepRecord::Spacing => [11, 0],
             StepRecord::Selected => [12, 0],
             StepRecord::OnGround => [13, 0],
+            StepRecord::Ground => [14, 0],
         }
     }
 }

@@ -36,6 +36,7 @@ mod windows_1252;
 
 pub use decoded_chunks::DecodedChunks;
 pub use file::random_access::not_a_file;
+pub use las::classified::{ClassifiedRecord, write_classified};
 pub use measured::{MeasuredPoints, PlausiblePoints};
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;

@@ -16,6 +16,7 @@ use crs::choice::CrsChoice;
 use crs::target::{NamedCrs, TargetCrs};
 use crs::transform::datum_rule::DatumRule;
 use crs::unit::Unit;
+use ground::GroundSizes;
 use lattice::shortest_decimal;
 
 /// Tells whether a name in the options is a URL and no path.
@@ -84,6 +85,9 @@ pub struct InputOptions {
     /// What the job does with a file that cannot be used.
     #[serde(default)]
     pub on_bad_file: OnBadFile,
+    /// How the program finds the ground by itself.
+    #[serde(default, skip_serializing_if = "GroundSizes::is_default")]
+    pub bare_earth: GroundSizes,
     /// How text files are laid out, if detection gets it wrong.
     #[serde(default)]
     pub csv: TextOptions,
@@ -117,6 +121,11 @@ impl InputOptions {
         }
     }
 
+    /// Tells whether the program finds the ground by itself.
+    pub fn finds_ground(&self) -> bool {
+        self.surface == Surface::BareEarth
+    }
+
     /// Returns whether the options choose classes, so that it matters if a text has none.
     pub fn chooses_classes(&self) -> bool {
         self.classes.is_some() || self.surface.classes().is_some()
@@ -133,6 +142,7 @@ impl InputOptions {
     /// Returns which points the mesh is made of, for a sentence about it.
     pub fn mesh_of(&self) -> MeshOf {
         match (&self.classes, self.kept_returns(), self.surface) {
+            (_, _, Surface::BareEarth) => MeshOf::Surface(Surface::BareEarth),
             (None, KeptReturns::All, surface) => MeshOf::Surface(surface),
             (None, KeptReturns::First, Surface::All | Surface::First) => MeshOf::Surface(Surface::First),
             (None, KeptReturns::Last, Surface::All | Surface::Last) => MeshOf::Surface(Surface::Last),
@@ -147,7 +157,7 @@ impl InputOptions {
 
     /// Returns whether the options leave out points of some class or return. Noise does not count.
     pub fn chooses_kinds(&self) -> bool {
-        self.chooses_classes() || self.kept_returns() != KeptReturns::All
+        self.finds_ground() || self.chooses_classes() || self.kept_returns() != KeptReturns::All
     }
 
     /// Returns what contradicts `surface`, if something does. `classes` may take some of the classes of the ground, and `returns` some
@@ -159,6 +169,9 @@ impl InputOptions {
                 "surface = \"ground\" keeps ground and water (classes 2, 8, 9 and 20), and class {class} in classes is neither: leave out \
                  one of both keys"
             ));
+        }
+        if self.bare_earth != GroundSizes::default() && !self.finds_ground() {
+            return Some("bare_earth only applies with surface = \"bare-earth\": set that, or remove the table".into());
         }
         let returns = self.surface.returns();
         let is_open = [returns, self.returns].contains(&KeptReturns::All) || returns.is_same(self.returns);

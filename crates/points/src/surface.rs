@@ -11,10 +11,6 @@ use crate::points::returns::{KeptReturns, PulseReturn};
 use crate::source::Source;
 use sys::Result;
 
-/// The command that finds the ground in a cloud whose unit is the metre. Without its last word, the steps of the coordinates become a
-/// hundredth.
-pub const CLASSIFY: &str = "pdal translate in.laz out.laz smrf --writers.las.forward=all";
-
 /// The chunks in which a sample of a source looks.
 const SAMPLED_CHUNKS: usize = 16;
 
@@ -23,13 +19,15 @@ const SAMPLED_RECORDS: u64 = 4096;
 
 /// Which surface a job makes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Surface {
     /// That of all points but noise.
     #[default]
     All,
-    /// Bare earth: that of the points on the ground and on water.
+    /// Bare earth: that of the points on the ground and on water, by their classes.
     Ground,
+    /// Bare earth: that of the points that the program takes for ground, whatever their classes.
+    BareEarth,
     /// That of first returns: roofs and tree tops.
     First,
     /// That of last returns.
@@ -46,7 +44,8 @@ impl Surface {
     pub fn returns(self) -> KeptReturns {
         match self {
             Surface::First => KeptReturns::First,
-            Surface::Last => KeptReturns::Last,
+            // A pulse that has more returns met something above the ground first.
+            Surface::Last | Surface::BareEarth => KeptReturns::Last,
             Surface::All | Surface::Ground => KeptReturns::All,
         }
     }
@@ -115,24 +114,31 @@ impl SurfaceShares {
         if points == 0 {
             return None;
         }
+        if mesh == MeshOf::Surface(Surface::BareEarth) {
+            return Some("bare earth: the program finds the ground".into());
+        }
         if ground == points {
             return Some("100 % ground: the mesh is bare earth".into());
         }
         if unclassified == points {
-            return Some(format!(
-                "the points have no classes that say more: the mesh has everything in it that they show, maybe vegetation and buildings; \
-                 `{CLASSIFY}` finds the ground"
-            ));
+            return Some(
+                "the points are not classified: the mesh may have vegetation and buildings in it; surface = \"bare-earth\" finds the ground"
+                    .into(),
+            );
         }
         let what = match mesh {
-            MeshOf::Surface(Surface::All | Surface::Ground) => {
+            MeshOf::Surface(Surface::All | Surface::Ground | Surface::BareEarth) => {
                 "the mesh of all points has vegetation or buildings in it"
             }
             MeshOf::Surface(Surface::First) => "the mesh of first returns has roofs and tree tops in it",
             MeshOf::Surface(Surface::Last) => "the mesh of last returns has buildings and dense vegetation in it",
             MeshOf::Chosen => "the mesh is that of the classes and returns that [input] chooses",
         };
-        let remedy = if ground > 0 && mesh != MeshOf::Chosen { "; surface = \"ground\" makes bare earth" } else { "" };
+        let remedy = match mesh {
+            MeshOf::Chosen => "",
+            _ if ground > 0 => "; surface = \"ground\" makes bare earth",
+            _ => "; surface = \"bare-earth\" finds the ground",
+        };
         Some(format!("{} ground: {what}{remedy}", percent(ground, points)))
     }
 
@@ -200,9 +206,13 @@ mod tests {
         assert!(say(&[(2, 1), (6, 2)], Surface::First).contains("33 % ground: the mesh of first returns has roofs"));
         assert!(say(&[(2, 1), (6, 2)], Surface::Last).contains("last returns"));
         assert_eq!(say(&[(2, 7), (8, 1), (9, 1), (20, 1)], Surface::Ground), "100 % ground: the mesh is bare earth");
-        assert!(say(&[(0, 3), (1, 4)], Surface::All).contains(CLASSIFY));
+        assert!(say(&[(0, 3), (1, 4)], Surface::All).contains("surface = \"bare-earth\" finds the ground"));
+        assert!(say(&[(2, 3), (1, 4)], Surface::BareEarth).starts_with("bare earth: the program finds"));
         let none = say(&[(5, 3), (1, 4)], Surface::All);
-        assert!(none.starts_with("0 % ground") && !none.contains("bare earth"), "{none}");
+        assert!(
+            none.starts_with("0 % ground") && none.ends_with("surface = \"bare-earth\" finds the ground"),
+            "{none}"
+        );
         assert_eq!(say(&[(7, 5)], Surface::All), "");
         let chosen = shares(&[(2, 1), (40, 1)]).sentence(MeshOf::Chosen).unwrap();
         assert_eq!(chosen, "50 % ground: the mesh is that of the classes and returns that [input] chooses");

@@ -5,7 +5,7 @@ use crate::points::classes;
 use crate::points::classes::is_ground;
 use crate::points::counts::PointCounts;
 use crate::points::returns::KeptReturns;
-use crate::surface::{CLASSIFY, Surface, percent};
+use crate::surface::{Surface, percent};
 
 /// The most classes that a sentence lists.
 const MOST_LISTED: usize = 8;
@@ -17,22 +17,25 @@ pub fn no_ground(options: &InputOptions, counts: &PointCounts) -> Option<String>
         return None;
     }
     Some(format!(
-        "surface = \"ground\" takes classes 2, 8, 9 and 20, and the points have {}: find the ground first, for example with \
-         `{CLASSIFY}`, or choose what is there with `classes`",
+        "surface = \"ground\" takes classes 2, 8, 9 and 20, and the points have {}: set surface = \"bare-earth\" to \
+         let the program find the ground, or choose what is there with `classes`",
         listed(counts)
     ))
 }
 
 /// Returns what to do about a text without a column of classes, if the job wants the ground.
 pub fn no_column_of_classes() -> String {
-    format!(
-        "surface = \"ground\" takes classes 2, 8, 9 and 20, and the file has no column of classes: find the ground first, for example with \
-         `{CLASSIFY}`, name the column with `columns` under [input.csv], or leave `surface` out to make the mesh of all points"
-    )
+    "surface = \"ground\" takes classes 2, 8, 9 and 20, and the file has no column of classes: set surface = \"bare-earth\" to let the \
+     program find the ground, name the column with `columns` under [input.csv], or leave `surface` out to make the mesh of all points"
+        .into()
 }
 
 /// Returns a warning about records that do not say clearly which return they are.
 pub fn unclear_returns(options: &InputOptions, counts: &PointCounts) -> Option<String> {
+    // What is not told apart is looked at as a whole.
+    if options.finds_ground() {
+        return None;
+    }
     let rule = match options.kept_returns() {
         KeptReturns::All => return None,
         KeptReturns::First => "one without a number counts as the first",
@@ -84,12 +87,11 @@ mod tests {
         let ground = options("surface = \"ground\"");
         let what = no_ground(&ground, &counts(&[(1, 95), (5, 4), (70, 1)], 0)).unwrap();
         assert!(
-            what.contains("have class 1 (unclassified, 95 %), class 5 (high vegetation, 4 %), class 70 (1 %): find"),
+            what.contains("have class 1 (unclassified, 95 %), class 5 (high vegetation, 4 %), class 70 (1 %): set surface = \"bare-earth\""),
             "{what}"
         );
-        assert!(what.contains(CLASSIFY), "{what}");
         let many: Vec<(u8, u64)> = (30..60).map(|class| (class, 1)).collect();
-        assert!(no_ground(&ground, &counts(&many, 0)).unwrap().contains("class 37 (3 %), 22 more: find"));
+        assert!(no_ground(&ground, &counts(&many, 0)).unwrap().contains("class 37 (3 %), 22 more: set"));
         assert_eq!(no_ground(&ground, &counts(&[(1, 95), (20, 1)], 0)), None);
         assert_eq!(no_ground(&ground, &counts(&[], 0)), None);
         assert_eq!(no_ground(&options(""), &counts(&[(1, 95)], 0)), None);

@@ -14,6 +14,8 @@ const GLB: &str = "glb";
 const RASTER: &str = "raster";
 const JSON: &str = "json";
 const TIF: &str = "tif";
+const CLASSIFIED: &str = "classified";
+const LAZ: &str = "laz";
 const CHECKSUMS: &str = "XXH128SUMS";
 
 /// A folder holds at most this many numbered files, and as many folders for each power of this that numbers reach.
@@ -83,6 +85,11 @@ impl OutputFiles {
     pub fn numbered_folders(&self) -> [(PathBuf, &'static str); 5] {
         let rasters = (self.directory.join(RASTER), TIF);
         [(self.tiles(), GLB), (self.levels(), GLB), (self.cut(), GLB), (self.tilesets(), JSON), rasters]
+    }
+
+    /// Returns the folder of the inputs with the classes that the job has found, and the ending of their names.
+    pub fn classified(&self) -> (PathBuf, &'static str) {
+        (self.directory.join(CLASSIFIED), LAZ)
     }
 
     /// Returns the list of all tiles as 3D Tiles, or of the coarsest ones if there are external tilesets.

@@ -43,6 +43,9 @@ pub struct OutputOptions {
     /// How far a point may be from the mesh. `None` is a mesh of all points.
     #[serde(default, skip_serializing_if = "MaxError::is_none")]
     pub max_error: MaxError,
+    /// Whether the job writes its inputs with the classes that it has found.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub classified: bool,
     /// The longest edge of a triangle that is not left out.
     #[serde(default)]
     pub max_edge: MaxEdge,

@@ -14,8 +14,9 @@ use crate::report::ReportedFacts;
 use crate::source_grid::SourceGrid;
 use crate::surface::{Bound, Surface, SurfaceProof};
 use delaunay::geometry::Site;
+use ground::{CoveredArea, Ground, LowestHeights, PointCollector, Scale};
 use lattice::{AxisMap, Lattice, shortest_decimal};
-use points::options::Duplicates;
+use points::options::{Duplicates, InputOptions};
 use points::samples::{FileSamples, fingerprint_of};
 use points::transform_sources::transform_sources;
 use points::{
@@ -31,6 +32,9 @@ const VERTEX: u32 = 0;
 
 /// The number of the source of an end of an edge along a breakline: above those of all inputs.
 const LINE: u32 = u32::MAX;
+
+/// Decodes the points of a chunk into a sink.
+type DecodeChunk<'a> = dyn Fn(&mut dyn FnMut(&[Point]) -> Result<()>) -> Result<()> + 'a;
 
 /// A vertex of the mesh, or a point of an input.
 #[repr(C)]
@@ -94,6 +98,7 @@ pub(super) struct InputProof {
 pub(super) struct Inputs<'a> {
     facts: &'a ReportedFacts,
     lattice: Lattice,
+    scale: Scale,
     sources: Vec<Source>,
     files: &'a [PathBuf],
 }
@@ -136,7 +141,12 @@ impl<'a> Inputs<'a> {
                 source.keep_outliers();
             }
         }
-        Ok(Inputs { facts, lattice: lattice_of(facts, extras)?, sources, files })
+        let lattice = lattice_of(facts, extras)?;
+        let scale = Scale {
+            horizontal: extras.resolution * extras.metres_per_unit,
+            vertical: extras.resolution_z * extras.metres_per_unit_z,
+        };
+        Ok(Inputs { facts, lattice, scale, sources, files })
     }
 
     /// Compares the vertices in `places` with the points of the inputs, and with the ends of the edges along breaklines. Points that are no
@@ -152,16 +162,20 @@ impl<'a> Inputs<'a> {
         grid: &SourceGrid,
     ) -> Result<InputProof> {
         lines.map_or(Ok(()), |lines| places.add_lines(lines))?;
-        let mut first_order = 0;
-        for (number, source) in (VERTEX + 1..).zip(&self.sources) {
-            let rules = self.rules(source, first_order)?;
-            let _ahead = source.read_ahead(rules.bounds.as_ref(), false)?;
-            (0..source.chunks()).into_par_iter().try_for_each(|chunk| {
-                interrupt::check()?;
-                source.decode(chunk, &rules, &mut |points| places.add_points(number, points)).map(drop)
-            })?;
-            first_order += source.records;
-        }
+        // Points that lines have dropped had no say in what the ground is.
+        let is_ground_unknown = self.wants_ground() && lines.is_some();
+        let surface = surface.filter(|_| !is_ground_unknown);
+        let ground = (self.wants_ground() && !is_ground_unknown).then(|| self.find_ground()).transpose()?;
+        self.each_chunk(&|number, decode| {
+            decode(&mut |points| match &ground {
+                None => places.add_points(number, points),
+                Some(ground) => {
+                    let on_ground: Vec<Point> =
+                        points.iter().filter(|point| ground.has(point.corner())).copied().collect();
+                    places.add_points(number, &on_ground)
+                }
+            })
+        })?;
         let duplicates = self.facts.input.as_ref().map(|input| input.duplicates);
         let has_lines = lines.is_some();
         let selects = surface.is_some();
@@ -188,7 +202,55 @@ impl<'a> Inputs<'a> {
         })?;
         failure.map_or(Ok(()), Err)?;
         let on_surface = surface.map(|surface| self.check_surface(surface, lines)).transpose()?;
-        self.proof(differences, on_surface)
+        let mut proof = self.proof(differences, on_surface, is_ground_unknown)?;
+        if is_ground_unknown {
+            let unknown = "which points lie on the ground is not proved for a job with breaklines";
+            proof.unproved.get_or_insert_with(|| unknown.to_owned());
+        }
+        Ok(proof)
+    }
+
+    /// Tells whether the job wanted only the ground, and found it itself.
+    fn wants_ground(&self) -> bool {
+        self.facts.input.as_ref().is_some_and(InputOptions::finds_ground)
+    }
+
+    /// Finds the ground anew, as the job did.
+    fn find_ground(&self) -> Result<Ground> {
+        let area = self.collect(CoveredArea::new(self.scale))?;
+        let lowest = self.collect(LowestHeights::new(&area))?;
+        let sizes = self.facts.input.as_ref().map(|input| input.bare_earth).unwrap_or_default();
+        Ground::find(&lowest, sizes, interrupt::check)
+    }
+
+    /// Adds all points that the job wanted to `collector`.
+    fn collect<C: PointCollector + Sync>(&self, collector: C) -> Result<C> {
+        let all = Mutex::new(collector.emptied());
+        self.each_chunk(&|_, decode| {
+            let mut found = collector.emptied();
+            decode(&mut |points| {
+                found.add(points.iter().map(Point::corner));
+                Ok(())
+            })?;
+            all.lock().unwrap_or_else(PoisonError::into_inner).join(&found);
+            Ok(())
+        })?;
+        Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Calls `take` for each chunk of the inputs, with the number of the input and with what decodes the points that the job wanted, on all threads.
+    fn each_chunk(&self, take: &(dyn Fn(u32, &DecodeChunk) -> Result<()> + Sync)) -> Result<()> {
+        let mut first_order = 0;
+        for (number, source) in (VERTEX + 1..).zip(&self.sources) {
+            let rules = self.rules(source, first_order)?;
+            let _ahead = source.read_ahead(rules.bounds.as_ref(), false)?;
+            (0..source.chunks()).into_par_iter().try_for_each(|chunk| {
+                interrupt::check()?;
+                take(number, &|sink| source.decode(chunk, &rules, sink).map(drop))
+            })?;
+            first_order += source.records;
+        }
+        Ok(())
     }
 
     /// Compares the points that are no vertices with the mesh. Without a bound, nothing is known.
@@ -219,7 +281,12 @@ impl<'a> Inputs<'a> {
         })
     }
 
-    fn proof(&self, differences: Differences, on_surface: Option<Option<SurfaceProof>>) -> Result<InputProof> {
+    fn proof(
+        &self,
+        differences: Differences,
+        on_surface: Option<Option<SurfaceProof>>,
+        is_ground_unknown: bool,
+    ) -> Result<InputProof> {
         let (points, mut failures) = (differences.points, differences.sentences());
         let dropped = self.facts.points.map_or(0, |points| points.at_breaklines);
         let step = self.lattice.resolution_z.to_f64().unwrap_or(f64::NAN);
@@ -236,7 +303,11 @@ impl<'a> Inputs<'a> {
         }
         if let Some(proof) = on_surface.flatten() {
             failures.extend(differences.beyond(&proof, dropped));
-        } else if on_surface.is_none() && differences.dropped != dropped && self.facts.input.is_some() {
+        } else if on_surface.is_none()
+            && !is_ground_unknown
+            && differences.dropped != dropped
+            && self.facts.input.is_some()
+        {
             failures.push(format!(
                 "{} points of the inputs are no vertices, where report.json says that {dropped} were dropped at breaklines",
                 differences.dropped

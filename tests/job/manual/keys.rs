@@ -8,8 +8,17 @@ use toml::{Table, Value};
 const LEAST: &str = "[input]\nfiles = [\"a.laz\"]\n[output]\ndirectory = \"out\"\n";
 
 /// The tables of a configuration.
-pub(super) const TABLES: [&str; 8] =
-    ["[input]", "[input.csv]", "[[breaklines]]", "[triangulation]", "[gpu]", "[output]", "[output.raster]", "[limits]"];
+pub(super) const TABLES: [&str; 9] = [
+    "[input]",
+    "[input.bare_earth]",
+    "[input.csv]",
+    "[[breaklines]]",
+    "[triangulation]",
+    "[gpu]",
+    "[output]",
+    "[output.raster]",
+    "[limits]",
+];
 
 /// A key and its table.
 pub(super) type Key = (String, String);
@@ -38,6 +47,9 @@ pub(super) fn load(table: &str, key: &str, value: Value) -> Result<(), String> {
     let names: Vec<&str> = table.trim_matches(['[', ']']).split('.').collect();
     let mut place = Table::new();
     match table {
+        "[input.bare_earth]" => {
+            drop(whole["input"].as_table_mut().unwrap().insert("surface".into(), "bare-earth".into()))
+        }
         "[[breaklines]]" => drop(place.insert("files".into(), vec!["a.gpkg"].into())),
         "[output.raster]" => drop(place.insert("resolution".into(), Value::Float(1.0))),
         _ if names.len() == 1 => {

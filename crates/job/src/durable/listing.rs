@@ -49,7 +49,20 @@ impl Leftovers {
         for (folder, ending) in output.numbered_folders() {
             left.add_folder(&folder, &mut Vec::new(), ending)?;
         }
+        left.add_named_files(output.classified())?;
         Ok(left)
+    }
+
+    /// Adds the files with this ending in a folder, if it is there, and partial ones. Their names are those of inputs.
+    fn add_named_files(&mut self, (folder, ending): (PathBuf, &str)) -> Result<()> {
+        if !is_folder(&folder)? {
+            self.no_folders.extend(exists(&folder)?.then_some(folder));
+            return Ok(());
+        }
+        let is_own = |path: &PathBuf| path.extension().is_some_and(|found| found == ending) || is_partial(path);
+        self.files.extend(entries(&folder)?.into_iter().filter(is_own));
+        self.folders.push(folder);
+        Ok(())
     }
 
     /// Adds what is in a folder of numbered files, if it is there. `below` names the folders that lead to it from that of its kind.

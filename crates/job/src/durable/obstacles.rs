@@ -86,7 +86,10 @@ fn has_own_report(path: &Path) -> Result<bool> {
 
 /// Returns the first file with the name of a result that is none of those `known`, nor of a job under way.
 fn first_unknown(directory: &JobDirectory, known: &KnownResults) -> Result<Option<PathBuf>> {
-    let is_unknown = |path: &PathBuf| !is_partial(path) && !known.contains(&directory.name(path));
+    // What has the name of an input may be anyone's. It stays, unless a job wrote it.
+    let (named, _) = directory.results().classified();
+    let is_unknown =
+        |path: &PathBuf| !is_partial(path) && !path.starts_with(&named) && !known.contains(&directory.name(path));
     let mut unknown = Vec::new();
     for path in Leftovers::of(directory.results())?.files.into_iter().filter(is_unknown) {
         if is_there(&path)? {

@@ -62,7 +62,7 @@ pub fn triangulate_leaf(
     triangulator: &Triangulator,
     tile: TileIndex,
 ) -> crate::Result<LeafStats> {
-    let (points, duplicates) = load_sites(points, &partition.blocks[tile.get()], plan.options.input.duplicates)?;
+    let (points, duplicates) = load_sites(points, &partition.blocks[tile.get()], plan.options.input.duplicates, None)?;
     let sites: Vec<Site> = points.iter().map(|p| p.position).collect();
     let (mesh, outcome) = triangulator.triangulate(&sites)?;
     let node = partition.tree.leaf(tile);

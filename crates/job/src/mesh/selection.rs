@@ -1,4 +1,5 @@
-//! Step 2a, for jobs with `[output] max_error`: the points of all parts as [`selection`] takes them, and writing those that it selects.
+//! Step 2a, for jobs that leave points out of the mesh: the points of all parts, as [`ground`] and [`selection`] take them, and writing those that
+//! are left.
 
 use crate::durable::directory::JobDirectory;
 use crate::index::{PartIndex, TileIndex};
@@ -18,6 +19,7 @@ use crate::{Error, Result};
 use delaunay::geometry::Site;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay_gpu::triangulator::Triangulator;
+use ground::{BYTES_PER_CELL, CoveredArea, Ground, LowestHeights, PointCollector, Scale};
 use points::Point;
 use rayon::prelude::*;
 use rust_decimal::Decimal;
@@ -26,6 +28,7 @@ use selection::{
 };
 use std::collections::HashSet;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 use sys::{fault, interrupt};
 use tiles::options::MaxError;
 
@@ -95,6 +98,19 @@ pub(crate) fn too_many_vertices(options: &JobOptions, selected: u64) -> Option<S
     })
 }
 
+/// Returns what is wrong if the memory has no room for the heights of so many cells.
+fn too_many_cells(options: &JobOptions, cells: u64) -> Option<String> {
+    let has_room = cells.saturating_mul(BYTES_PER_CELL) <= working_memory(options);
+    (!has_room).then(|| {
+        format!(
+            "surface = \"bare-earth\" needs memory for at least {} cells of the ground, more than [limits] memory = \"{}\" allows: set more, or leave \
+             out points that lie far from all others by [input] bounds",
+            grouped(cells),
+            options.limits.memory
+        )
+    })
+}
+
 /// A part whose points have all been read, cut into blocks.
 pub(crate) struct PartInBlocks {
     pub(crate) part: PartIndex,
@@ -103,12 +119,23 @@ pub(crate) struct PartInBlocks {
     pub(crate) files: Vec<(u16, PathBuf)>,
 }
 
+/// The points of a part that are left, in a file.
+pub(crate) struct WrittenPoints {
+    pub(crate) blocks: ReadBlocks,
+    /// The points that vertices were selected from: all, or those on the ground.
+    pub(crate) wanted: u64,
+    /// Those of them that were dropped because another has the same x and y.
+    pub(crate) duplicates: u64,
+}
+
 /// The points of all parts.
 pub(crate) struct PointsInBlocks<'a> {
     plan: &'a Plan,
     triangulator: &'a Triangulator,
     parts: &'a [PartInBlocks],
     blocks: Vec<(usize, TileIndex)>,
+    /// The ground, where only its points are wanted.
+    ground: Option<Ground>,
     /// Triangles that flow by it may be slivers along the hull, unless they are on ground.
     rule: HullRule,
 }
@@ -118,12 +145,53 @@ impl<'a> PointsInBlocks<'a> {
         let blocks =
             |(number, part): (usize, &'a PartInBlocks)| part.partition.tree.tiles().map(move |tile| (number, tile));
         let blocks = parts.iter().enumerate().flat_map(blocks).collect();
-        PointsInBlocks { plan, triangulator, parts, blocks, rule: HullRule::of_lengths(plan) }
+        PointsInBlocks { plan, triangulator, parts, blocks, ground: None, rule: HullRule::of_lengths(plan) }
     }
 
-    /// Returns the number of points, with those of which another has the same x and y.
-    pub(crate) fn points(&self) -> u64 {
-        self.parts.iter().map(|part| part.partition.kept).sum()
+    /// Leaves only the points on the ground, which it finds.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] on point files; [`sys::Error::Config`] if the memory does not hold the heights of all cells.
+    pub(crate) fn on_found_ground(mut self, advance: impl Fn(u64) + Sync) -> Result<PointsInBlocks<'a>> {
+        let [horizontal, vertical] = self.plan.frame.resolution_metres();
+        let area = self.collect(&CoveredArea::new(Scale { horizontal, vertical }), &|_| None)?;
+        let refusal = |lowest: &LowestHeights| too_many_cells(&self.plan.options, lowest.cells());
+        let lowest = self.collect(&LowestHeights::new(&area), &refusal)?;
+        let points: u64 = self.parts.iter().map(|part| part.partition.kept).sum();
+        advance(points / 2);
+        fault::point("ground");
+        self.ground = Some(Ground::find(&lowest, self.plan.options.input.bare_earth, interrupt::check)?);
+        advance(points - points / 2);
+        Ok(self)
+    }
+
+    /// Adds all points but the sites of lines to a collector such as the `empty` one. `refusal` tells what speaks against going on.
+    fn collect<C: PointCollector + Sync>(
+        &self,
+        empty: &C,
+        refusal: &(dyn Fn(&C) -> Option<String> + Sync),
+    ) -> Result<C> {
+        let all = Mutex::new(empty.emptied());
+        self.blocks.par_iter().with_max_len(1).try_for_each(|&(part, tile)| -> Result<()> {
+            interrupt::check()?;
+            let PartInBlocks { partition, files, .. } = &self.parts[part];
+            let files = PointFiles::open(files)?;
+            let (mut found, mut points) = (empty.emptied(), Vec::new());
+            for &block in &partition.blocks[tile.get()] {
+                points.clear();
+                files.read(block, &mut points)?;
+                found.add(points.iter().filter(|point| !self.is_of_line(point)).map(Point::corner));
+            }
+            let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
+            all.join(&found);
+            refusal(&all).map_or(Ok(()), |why| Err(sys::Error::Config(why).into()))
+        })?;
+        Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Returns the ground, if only its points are wanted.
+    pub(crate) fn ground(&self) -> Option<&Ground> {
+        self.ground.as_ref()
     }
 
     /// Returns the triangles on ground among those that hold so many points.
@@ -132,11 +200,16 @@ impl<'a> PointsInBlocks<'a> {
         holding.into_iter().filter(has_ground).map(|(corners, _)| corners).collect()
     }
 
-    fn sites(&self, part: usize, tile: TileIndex) -> Result<Vec<Point>> {
+    /// Returns the sites of a block, and how many points were dropped because another has the same x and y.
+    fn sites(&self, part: usize, tile: TileIndex) -> Result<(Vec<Point>, u64)> {
         interrupt::check()?;
         let PartInBlocks { partition, files, .. } = &self.parts[part];
-        let files = PointFiles::open(files)?;
-        Ok(load_sites(&files, &partition.blocks[tile.get()], self.plan.options.input.duplicates)?.0)
+        let (files, rule) = (PointFiles::open(files)?, self.plan.options.input.duplicates);
+        let is_on_ground = |point: &Point| {
+            self.ground.as_ref().is_none_or(|ground| ground.has(point.corner())) || self.is_of_line(point)
+        };
+        let is_wanted = self.ground.as_ref().map(|_| &is_on_ground as &dyn Fn(&Point) -> bool);
+        Ok(load_sites(&files, &partition.blocks[tile.get()], rule, is_wanted)?)
     }
 
     /// Tells whether a point is the site of a line, which every triangulation of the job has.
@@ -144,37 +217,43 @@ impl<'a> PointsInBlocks<'a> {
         point.order() >= self.plan.records
     }
 
-    /// Writes the points of one part that are selected to a file of their own, without the sites of lines. `directory` is that of the part.
+    /// Writes the points of one part that are selected to a file of their own, without the sites of lines; without `selected` all that are on the
+    /// ground. `directory` is that of the part.
     ///
     /// # Errors
     /// [`sys::Error::Io`] on point files.
     pub(crate) fn write_selected(
         &self,
         number: usize,
-        selected: &SelectedSites,
+        selected: Option<&SelectedSites>,
         parts: &Parts,
         directory: &JobDirectory,
         sync: bool,
-    ) -> Result<ReadBlocks> {
+    ) -> Result<WrittenPoints> {
         let part = &self.parts[number];
         let file = file_of_selected(parts);
         let file = PointFile::create(&directory.point_file(file), file)?;
         let buckets = Buckets::new(&file, parts.grid.buckets(), read_buffer_memory(&self.plan.options));
         let tiles: Vec<TileIndex> = part.partition.tree.tiles().collect();
-        tiles.into_par_iter().with_max_len(1).try_for_each(|tile| -> Result<()> {
-            let mut sites = self.sites(number, tile)?;
-            let Some(bounds) = delaunay::geometry::Bounds::of_points(sites.iter().map(|site| site.position)) else {
-                return Ok(());
-            };
-            let selected: HashSet<Site> = selected.within(bounds).map(|[x, y, _]| [x, y]).collect();
-            sites.retain(|site| selected.contains(&site.position) && !self.is_of_line(site));
-            Ok(BucketSorter::new(&parts.grid, &buckets).add(&sites)?)
-        })?;
+        let write = |tile| -> Result<[u64; 2]> {
+            let (mut sites, duplicates) = self.sites(number, tile)?;
+            sites.retain(|site| !self.is_of_line(site));
+            let wanted = sites.len() as u64 + duplicates;
+            let bounds = delaunay::geometry::Bounds::of_points(sites.iter().map(|site| site.position));
+            if let Some((bounds, selected)) = bounds.zip(selected) {
+                let selected: HashSet<Site> = selected.within(bounds).map(|[x, y, _]| [x, y]).collect();
+                sites.retain(|site| selected.contains(&site.position));
+            }
+            BucketSorter::new(&parts.grid, &buckets).add(&sites)?;
+            Ok([wanted, duplicates])
+        };
+        let sum = |a: [u64; 2], b: [u64; 2]| Ok([a[0] + b[0], a[1] + b[1]]);
+        let [wanted, duplicates] = tiles.into_par_iter().with_max_len(1).map(write).try_reduce(|| [0; 2], sum)?;
         let blocks = ReadBlocks::of(buckets.finish()?);
         if sync {
             file.sync()?;
         }
-        Ok(blocks)
+        Ok(WrittenPoints { blocks, wanted, duplicates })
     }
 }
 
@@ -187,7 +266,7 @@ impl PointSource for PointsInBlocks<'_> {
 
     fn load(&self, block: usize) -> Result<BlockPoints> {
         let (part, tile) = self.blocks[block];
-        let sites = self.sites(part, tile)?;
+        let (sites, _) = self.sites(part, tile)?;
         let fixed = sites.iter().filter(|point| self.is_of_line(point)).map(Point::corner).collect();
         Ok(BlockPoints { points: sites.iter().map(Point::corner).collect(), fixed })
     }

@@ -8,17 +8,26 @@ use points::options::Duplicates;
 use std::cmp::Reverse;
 use sys::Result;
 
-/// Reads the points in `blocks` and keeps one of those with equal x and y. Returns the sites in order, and the number of points that
-/// were dropped. However often points repeat, about twice as many as stay are read before they are thinned, or 2^20; thinning copies
+/// Reads the points in `blocks` that `is_wanted`, and keeps one of those with equal x and y. Returns the sites in order, and the number of wanted
+/// points that were dropped. However often points repeat, about twice as many as stay are read before they are thinned, or 2^20; thinning copies
 /// those that stay.
 ///
 /// # Errors
 /// [`sys::Error::Io`] if the point file cannot be read.
-pub fn load_sites(files: &PointFiles, blocks: &[PointBlock], rule: Duplicates) -> Result<(Vec<Point>, u64)> {
+pub fn load_sites(
+    files: &PointFiles,
+    blocks: &[PointBlock],
+    rule: Duplicates,
+    is_wanted: Option<&dyn Fn(&Point) -> bool>,
+) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::with_capacity(blocks.iter().map(|b| b.points as usize).sum::<usize>().min(1 << 20));
     let (mut kept, mut duplicates) = (0, 0);
     for &block in blocks {
+        let first = points.len();
         files.read(block, &mut points)?;
+        if let Some(is_wanted) = is_wanted {
+            retain_from(&mut points, first, is_wanted);
+        }
         if points.len() > (2 * kept).max(1 << 20) {
             duplicates += keep_one(&mut points, rule);
             kept = points.len();
@@ -26,6 +35,18 @@ pub fn load_sites(files: &PointFiles, blocks: &[PointBlock], rule: Duplicates) -
     }
     duplicates += keep_one(&mut points, rule);
     Ok((points, duplicates))
+}
+
+/// Removes those of `points` from the number `first` on that are not wanted.
+fn retain_from(points: &mut Vec<Point>, first: usize, is_wanted: &dyn Fn(&Point) -> bool) {
+    let mut kept = first;
+    for number in first..points.len() {
+        if is_wanted(&points[number]) {
+            points[kept] = points[number];
+            kept += 1;
+        }
+    }
+    points.truncate(kept);
 }
 
 /// Sorts `points` by y, then x, keeps one of every x and y, and returns how many were dropped. Neighbours in the plane become neighbours

@@ -257,6 +257,12 @@ fn try_plan(
 /// # Errors
 /// [`Error::Config`] for options that cannot be had together.
 fn refuse_contradicting_options(options: &JobOptions) -> Result<()> {
+    if options.output.classified && !options.input.finds_ground() {
+        return Err(Error::Config(
+            "[output] classified = true writes the ground that surface = \"bare-earth\" finds: set that under [input], or leave classified out"
+                .into(),
+        ));
+    }
     if options.output.selects() && options.output.max_edge == MaxEdge::Auto {
         return Err(Error::Config(
             "[output] max_edge = \"auto\" goes by the spacing of points, and with max_error flat ground has few vertices: give max_edge a \

@@ -111,9 +111,10 @@ pub(crate) fn refuse_missing_classes(sources: &[Source], options: &InputOptions)
 /// # Errors
 /// [`Error::Config`] names the first such file.
 pub(crate) fn refuse_missing_returns(sources: &[Source], options: &InputOptions) -> Result<()> {
-    let returns = options.kept_returns();
-    let columns = match returns {
+    let columns = match options.kept_returns() {
         KeptReturns::All => return Ok(()),
+        // The ground can be found without.
+        KeptReturns::Last if options.finds_ground() => return Ok(()),
         KeptReturns::Last => "return_number and number_of_returns",
         KeptReturns::First | KeptReturns::Numbers(_) => "return_number",
     };

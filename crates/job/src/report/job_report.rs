@@ -19,7 +19,7 @@ use delaunay_gpu::figures::GpuFigures;
 use lattice::Lattice;
 use lattice::VertexDigest;
 use points::options::InputOptions;
-use points::surface::SurfaceShares;
+use points::surface::{SurfaceShares, percent};
 use points::surface_warnings::unclear_returns;
 use points::transformation::{Transformation, transformations};
 use points::{NetworkTraffic, PlausiblePoints, PointCounts, TextReading};
@@ -39,6 +39,9 @@ pub struct Report {
     /// How the sites were selected from all points; `None` without `max_error`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub selection: Option<SelectionReport>,
+    /// The points on the ground, which vertices are taken from; `None` unless `surface = "bare-earth"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground: Option<u64>,
     /// Triangles in all tiles.
     pub triangles: u64,
     /// Triangles that `hull` or `max_edge` left out. They are in `cut`.
@@ -193,6 +196,8 @@ pub struct ReportParts {
     pub points: PointCounts,
     /// How vertices were selected; `None` if all points are.
     pub selection: Option<SelectionReport>,
+    /// The points on the ground; `None` where all are wanted.
+    pub ground: Option<u64>,
     /// Points that were not selected from, because another has the same x and y.
     pub duplicates: u64,
     /// The sum over all leaves.
@@ -272,6 +277,7 @@ impl Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
             sites: parts.leaves.sites,
             selection: parts.selection,
+            ground: parts.ground,
             triangles: parts.tiles.triangles,
             cut_triangles: parts.tiles.cut_triangles,
             hull_triangles: parts.tiles.slivers,
@@ -283,7 +289,12 @@ impl Report {
             duplicates: parts.leaves.duplicates + parts.duplicates,
             files: plan.inputs.len(),
             skipped: plan.skipped.clone(),
-            surface: SurfaceShares::of_kept(&parts.points).sentence(plan.options.input.mesh_of()),
+            surface: match parts.ground {
+                Some(ground) => {
+                    Some(format!("bare earth: {} of the points are on the ground", percent(ground, parts.points.kept)))
+                }
+                None => SurfaceShares::of_kept(&parts.points).sentence(plan.options.input.mesh_of()),
+            },
             points: parts.points,
             breaklines: plan.breaklines.as_ref().map(BreaklineReport::of),
             leaves: parts.leaves,

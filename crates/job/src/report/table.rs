@@ -67,6 +67,9 @@ impl fmt::Display for Report {
         if let Some(NetworkTraffic { requests, bytes }) = self.network {
             row("from other machines", format!("{} in {} requests", precise_mebibytes(bytes), grouped(requests)))?;
         }
+        if let Some(ground) = self.ground {
+            row("  on the ground", grouped(ground))?;
+        }
         row("sites", grouped(self.sites))?;
         if let Some(SelectionReport { points, max_error, rounds, greatest_error, mean_error, .. }) = &self.selection {
             let of = format!("of {} points, in {rounds} rounds", grouped(*points));

@@ -183,12 +183,13 @@ impl EarlierRun {
             progress.note("what the interrupted run left is damaged; starting over");
             return None;
         }
-        let (mut of_job, mut of_parts) = (vec![JobStep::Plan, JobStep::Raster, JobStep::Publish], Vec::new());
+        let (mut of_job, mut of_parts) =
+            (vec![JobStep::Plan, JobStep::Raster, JobStep::Classified, JobStep::Publish], Vec::new());
         match &change {
             JobChange::Nothing => {}
             JobChange::Raster(what) => {
                 progress.note(&format!("changed since the interrupted run: {what}; the tiles stay"));
-                of_job = vec![JobStep::Plan];
+                of_job = vec![JobStep::Plan, JobStep::Classified];
             }
             JobChange::Style(what) => {
                 let meshed = kept.parts.meshed();

@@ -1,6 +1,7 @@
 //! LAS and LAZ files: headers, variable length records, and their points, compressed or not.
 
 pub(crate) mod chunk_table;
+pub(crate) mod classified;
 pub(crate) mod compression;
 pub(crate) mod copc;
 pub(crate) mod crs_records;

@@ -8,10 +8,10 @@ use sys::bytes::{uint16, uint64};
 use sys::{Result, Warnings};
 
 /// The number of bytes before the data of a variable length record.
-const HEAD: u64 = 54;
+pub(crate) const HEAD: u64 = 54;
 
 /// The number of bytes before the data of an extended variable length record.
-const EXTENDED_HEAD: u64 = 60;
+pub(crate) const EXTENDED_HEAD: u64 = 60;
 
 /// The most records that are looked at; real files have a few.
 const MOST: u32 = 10_000;
@@ -31,6 +31,11 @@ impl Vlr {
     /// Returns whether this is the record `id` of `user`.
     pub(crate) fn is(&self, user: &str, id: u16) -> bool {
         self.id == id && self.user == user
+    }
+
+    /// Returns whether `user` has defined this record.
+    pub(crate) fn is_of(&self, user: &str) -> bool {
+        self.user == user
     }
 
     /// Returns where the record's data are in the file.

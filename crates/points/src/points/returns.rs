@@ -15,6 +15,11 @@ pub(crate) struct PulseReturn {
 }
 
 impl PulseReturn {
+    /// Tells whether another return of the pulse came later.
+    pub(crate) fn is_followed(self) -> bool {
+        !KeptReturns::Last.has(self)
+    }
+
     /// Returns whether both numbers are there and fit together.
     pub(crate) fn is_clear(self) -> bool {
         (1..=self.of).contains(&self.number)

@@ -10,6 +10,7 @@ use crate::mesh::leaf::LeafStats;
 use crate::plan::job_plan::Plan;
 use crate::plan::no_points::no_triangle;
 use crate::progress::number_text::grouped;
+use crate::publish::classified::{ClassifiedInputs, write_all};
 use crate::publish::flat_tile::FlatScene;
 use crate::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::publish::placement::{heights_warning, place, placement_warning};
@@ -28,7 +29,7 @@ use crate::run::phases::level_phase::{hierarchy_of, left_out_warning, level_size
 use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::part_store::PartStores;
 use crate::run::phases::read_phase::sum_up;
-use crate::run::phases::select_phase::SelectedPart;
+use crate::run::phases::select_phase::{SelectedPart, found_ground};
 use crate::run::phases::tile_queue::TileAppearance;
 use crate::run::whole_run::WholeRun;
 use crate::tiles::style::TileStyle;
@@ -67,7 +68,7 @@ pub(crate) fn publish_job(
     let tileset = wants_tileset(job.plan, &figures.tiles).then(|| levels_and_root(run, job, stores, joined, &figures));
     let (tiles, hull) = (&TilesOfParts { job, stores }, joined.hull_count(job, stores)?);
     let written = WrittenFiles { stats: figures.tiles, hull, tiles };
-    let published = publish(run, job.plan, bounds, &written, &joined.appearance, tileset.transpose()?)?;
+    let published = publish(run, job, bounds, &written, &joined.appearance, tileset.transpose()?)?;
     let peak_memory = parts.iter().map(PartProgress::peak_memory).max().flatten().max(joined.peak_memory);
     let costs = CostsOfParts {
         slowest: (parts.len() > 1).then(|| slowest(&parts)).flatten(),
@@ -94,8 +95,8 @@ struct PartFigures {
     /// The points of each part.
     points: Vec<u64>,
     temporary: u64,
-    /// How vertices were selected from the points of all parts.
-    selected: Option<SelectedPart>,
+    /// How vertices were selected from the points of all parts, by each part.
+    selected: Vec<SelectedPart>,
     /// Whether tasks meshed the parts.
     by_tasks: bool,
 }
@@ -120,8 +121,8 @@ impl PartFigures {
         let meshing: u64 = if by_tasks { temporary.sum() } else { temporary.max().unwrap_or(0) };
         // Most tiles may have been written after the last part was meshed.
         let temporary = meshing.max(parts.iter().map(|part| part.stored).sum());
-        let selected = parts.first().and_then(|part| part.selected.clone());
-        let temporary = temporary.max(selected.as_ref().map_or(0, |selected| selected.temporary));
+        let selected: Vec<SelectedPart> = parts.iter().filter_map(|part| part.selected.clone()).collect();
+        let temporary = selected.iter().map(|part| part.temporary).fold(temporary, u64::max);
         let points = meshed.iter().map(|mesh| mesh.points).collect();
         Ok(PartFigures { leaves, tiles, levels, points, temporary, selected, by_tasks })
     }
@@ -276,13 +277,15 @@ fn hull_warning(plan: &Plan, hull: HullCount) -> Option<String> {
 /// Those of the functions in [`crate::publish`].
 fn publish(
     run: &WholeRun,
-    plan: &Plan,
+    job: &Job,
     bounds: Bounds<3>,
     written: &WrittenFiles,
     appearance: &TileAppearance,
     tileset: Option<TilesetContent>,
 ) -> Result<Published> {
+    let plan = job.plan;
     let raster = write_raster(run, plan, &appearance.style.frame, written.tiles)?;
+    let classified = write_classified(run, job)?;
     let stage = run.progress.stage("publish", 1, "job");
     let output = &plan.options.output;
     let (mut warnings, mut text, mut placement, mut stats) = (Warnings::default(), None, None, LevelStats::default());
@@ -333,7 +336,8 @@ fn publish(
     }
     stage.advance(1);
     run.add_stage(stage.finish());
-    let bytes = bytes + raster.map_or(0, |raster| raster.bytes);
+    let bytes = bytes + raster.map_or(0, |raster| raster.bytes) + classified.bytes;
+    warnings.extend(classified.warnings);
     Ok(Published { bytes, levels: stats, raster, warnings })
 }
 
@@ -356,6 +360,23 @@ fn write_raster(run: &WholeRun, plan: &Plan, frame: &Frame, tiles: &dyn EachTile
     Ok(Some(WrittenRaster { warnings: work.warnings(run.directory, &stats)?, stats }))
 }
 
+/// Writes the inputs with the classes that the job has found, if the user wants that.
+///
+/// # Errors
+/// [`sys::Error::Io`] on files.
+fn write_classified(run: &WholeRun, job: &Job) -> Result<ClassifiedInputs> {
+    if !job.plan.options.output.classified {
+        return Ok(ClassifiedInputs::default());
+    }
+    let stage = run.progress.stage("classify", job.plan.records, "points");
+    let advance = |records| stage.advance(records);
+    let ground = found_ground(job)?;
+    let write = || write_all(job.plan, &ground, run.directory, &advance);
+    let classified = run.journal.step(JobStep::Classified, write)?;
+    run.add_stage(stage.finish());
+    Ok(classified)
+}
+
 /// Writes the report, which completes the job.
 ///
 /// # Errors
@@ -369,13 +390,16 @@ fn write_report(
     published: Published,
 ) -> Result<Report> {
     let list = write_file_list(run)?;
-    let selection = match (&figures.selected, job.plan.options.output.max_error) {
-        (Some(selected), MaxError::Units(bound)) => Some(SelectionReport::new(job.plan, bound, &selected.all)),
+    let of_all = figures.selected.first().and_then(|part| part.all);
+    let selection = match (of_all, job.plan.options.output.max_error) {
+        (Some(selected), MaxError::Units(bound)) => Some(SelectionReport::new(job.plan, bound, &selected)),
         _ => None,
     };
+    let finds_ground = job.plan.options.input.finds_ground();
     let parts = ReportParts {
         selection,
-        duplicates: figures.selected.as_ref().map_or(0, |selected| selected.duplicates),
+        ground: finds_ground.then(|| figures.selected.iter().map(|part| part.wanted).sum()),
+        duplicates: figures.selected.iter().map(|part| part.duplicates).sum(),
         parts: job.parts.all().len() as u64,
         slowest_part: costs.slowest,
         peak_memory: costs.peak_memory,

@@ -1,10 +1,11 @@
-//! Selecting the points that are vertices, of jobs with `[output] max_error`. All parts are read before, and none is meshed.
+//! Finding the points that are vertices, in jobs with `surface = "bare-earth"` or `[output] max_error`. All parts are read before, and none is
+//! meshed.
 
 use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::durable::directory::JobDirectory;
 use crate::durable::journal::records_of;
 use crate::index::PartIndex;
-use crate::mesh::selection::{PartInBlocks, PointsInBlocks, error_bound, points_per_block};
+use crate::mesh::selection::{PartInBlocks, PointsInBlocks, WrittenPoints, error_bound, points_per_block};
 use crate::partition::part_points::{PointsOfPart, file_of_selected};
 use crate::plan::budget::working_memory;
 use crate::plan::job_plan::Plan;
@@ -16,15 +17,18 @@ use crate::run::part_entries::{entries_of, open_store};
 use crate::run::phases::read_phase::points_of;
 use crate::{Error, Result};
 use delaunay::geometry::Site;
+use ground::{Ground, GroundColumns};
 use selection::{Figures, Selection, select};
 use serde::{Deserialize, Serialize};
 
 /// What is known of a part once its vertices are selected.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct SelectedPart {
-    /// The figures of the selection of all parts.
-    pub(crate) all: Figures,
-    /// Points of all parts of which another has the same x and y.
+    /// With `max_error`: the figures of the selection of all parts.
+    pub(crate) all: Option<Figures>,
+    /// The points of this part that vertices were selected from: all, or those on the ground.
+    pub(crate) wanted: u64,
+    /// Those of them that were dropped because another has the same x and y.
     pub(crate) duplicates: u64,
     /// Bytes of the point files of all parts, with the selected points of those that were written when this part was done.
     pub(crate) temporary: u64,
@@ -34,7 +38,7 @@ pub(crate) struct SelectedPart {
 
 /// Tells whether the job has the phase.
 pub(crate) fn selects(plan: &Plan) -> bool {
-    plan.options.output.selects()
+    plan.options.leaves_points_out()
 }
 
 /// Selects the vertices of all parts, unless that is done. All points have been read.
@@ -43,7 +47,7 @@ pub(crate) fn selects(plan: &Plan) -> bool {
 /// [`Error::DamagedSteps`] if points are damaged; [`sys::Error::Io`] on the folders of the parts; [`Error::InUse`] if another process has one;
 /// [`sys::Error::Config`] if the memory does not hold the selection.
 pub(crate) fn select_vertices(job: &Job) -> Result<()> {
-    let Some(bound) = error_bound(job.plan)? else { return Ok(()) };
+    let bound = error_bound(job.plan)?;
     let is_done = |part| {
         Ok(entries_of(&job.directory.part(part), job.header(part))?.iter().any(|entry| entry.step == JobStep::Select))
     };
@@ -64,12 +68,19 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
         Ok(PartInBlocks { part, partition, files })
     };
     let parts = job.parts.all().map(in_blocks).collect::<Result<Vec<PartInBlocks>>>()?;
-    let source = PointsInBlocks::new(job.plan, job.triangulator, &parts);
-    let Selection { sites, figures, holding } = select(&source, bound)?;
-    let on_ground = source.on_ground(holding);
-    let duplicates = source.points() - figures.points;
-    stage.advance(source.points());
-    let mut stages = vec![stage.finish()];
+    let mut source = PointsInBlocks::new(job.plan, job.triangulator, &parts);
+    if job.plan.options.input.finds_ground() {
+        source = source.on_found_ground(|points| stage.advance(points))?;
+    }
+    let selection = bound.map(|bound| select(&source, bound)).transpose()?;
+    let (sites, figures, on_ground) = match selection {
+        Some(Selection { sites, figures, holding }) => (Some(sites), Some(figures), source.on_ground(holding)),
+        None => (None, None, Vec::new()),
+    };
+    if !job.plan.options.input.finds_ground() {
+        stage.advance(parts.iter().map(|part| part.partition.kept).sum());
+    }
+    let mut stage = Some(stage);
     let mut temporary = parts.iter().map(|part| part.partition.point_bytes).sum();
     for (number, PartInBlocks { part, .. }) in parts.iter().enumerate() {
         let other = if number == 0 { None } else { Some(Folder::open(job, &directories[number], *part)?) };
@@ -77,14 +88,21 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
         if folder.done::<SelectedPart>(JobStep::Select)?.is_some() {
             continue;
         }
-        let blocks = source.write_selected(number, &sites, job.parts, &directories[number], job.syncs())?;
+        let WrittenPoints { blocks, wanted, duplicates } =
+            source.write_selected(number, sites.as_ref(), job.parts, &directories[number], job.syncs())?;
         blocks.save_as(&folder.store, StepRecord::Selected)?;
         if number == 0 {
             ColumnWriter::default().push(&on_ground).write(&folder.store, StepRecord::OnGround)?;
+            if let Some(GroundColumns { numbers, places, heights }) = source.ground().map(Ground::to_columns) {
+                let columns = ColumnWriter::default().push(&numbers).push(&places).push(&heights);
+                columns.write(&folder.store, StepRecord::Ground)?;
+            }
         }
         temporary += blocks.bytes();
-        let selected = SelectedPart { all: figures, duplicates, temporary, blocks: blocks.len() };
-        folder.record(JobStep::Select, selected, std::mem::take(&mut stages))?;
+        let selected = SelectedPart { all: figures, wanted, duplicates, temporary, blocks: blocks.len() };
+        let is_last = number + 1 == parts.len();
+        let stages = stage.take_if(|_| is_last).map(|stage| stage.finish()).into_iter().collect();
+        folder.record(JobStep::Select, selected, stages)?;
     }
     job.plan.on_ground.set(on_ground);
     Ok(())
@@ -103,6 +121,20 @@ pub(crate) fn know_selection(job: &Job) -> Result<()> {
         job.plan.on_ground.set(on_ground.iter().copied());
     }
     Ok(())
+}
+
+/// Returns the ground that the job has found.
+///
+/// # Errors
+/// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store of the first part.
+pub(crate) fn found_ground(job: &Job) -> sys::Result<Ground> {
+    let directory = job.directory.part(PartIndex::FIRST);
+    let entries = entries_of(&directory, job.header(PartIndex::FIRST))?;
+    let store = open_store(&directory, records_of(&entries).into_values())?;
+    let mut columns = ColumnReader::open(&store, StepRecord::Ground)?;
+    let ground =
+        GroundColumns { numbers: columns.column_vec()?, places: columns.column_vec()?, heights: columns.column_vec()? };
+    Ground::of_columns(ground).ok_or_else(|| sys::Error::Broken("the ground has no heights".into()))
 }
 
 /// Returns the points of a part that are vertices: all, or those that are selected. `store` is that of the part.

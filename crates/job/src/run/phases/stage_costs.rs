@@ -6,6 +6,8 @@ use points::FileFormat;
 
 /// Nanoseconds of one processor for each point, measured on autzen.laz (see BENCHMARKS.md). Only their ratios matter.
 const MESH: f64 = 740.0;
+/// Of finding the ground.
+const GROUND: f64 = 300.0;
 /// Of selecting vertices: it depends on how many they are.
 const SELECT: f64 = 1500.0;
 const LEVELS: f64 = 900.0;
@@ -30,9 +32,11 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
     let points = plan.records as f64;
     let raster = planned_raster(plan);
     let raster = raster.map_or(0.0, |grid| grid.cells() as f64 * RASTER + grid.stored_cells() as f64 * RASTER_STORED);
+    let ground = if plan.options.input.finds_ground() { GROUND } else { 0.0 };
+    let selecting = if plan.options.output.selects() { SELECT } else { 0.0 };
     vec![
         ("read", reading),
-        ("select", if plan.options.output.selects() { points * SELECT } else { 0.0 }),
+        ("select", points * (ground + selecting)),
         ("mesh", points * MESH),
         ("levels", points * LEVELS),
         ("raster", raster),

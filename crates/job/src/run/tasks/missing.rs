@@ -136,7 +136,7 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
     if is_same && PlannedJob::open(&directory, options, 0)?.is_some() {
         missing_tasks_of_planned(options, tasks)
     } else {
-        Ok(PhaseTasks::all(tasks, options.output.selects()))
+        Ok(PhaseTasks::all(tasks, options.leaves_points_out()))
     }
 }
 
@@ -161,5 +161,5 @@ pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Resu
 
 fn of_each(options: &JobOptions, tasks: u32, missing: impl Fn(Phase) -> Vec<u32>) -> Vec<PhaseTasks> {
     let of_phase = |phase: Phase| PhaseTasks { phase, count: phase.tasks(tasks), missing: missing(phase) };
-    Phase::of_job(options.output.selects()).map(of_phase).collect()
+    Phase::of_job(options.leaves_points_out()).map(of_phase).collect()
 }

@@ -63,7 +63,7 @@ fn publish(directory: &JobDirectory, options: &JobOptions, run: RunOptions, task
         let job = PlannedJob::open(directory, options, run.submission)?.ok_or_else(not_planned)?;
         if !job.is_complete {
             let progress = JobProgressByPart::of(&job)?;
-            let mut before = Phase::of_job(options.output.selects()).filter(|phase| *phase != Phase::Publish);
+            let mut before = Phase::of_job(options.leaves_points_out()).filter(|phase| *phase != Phase::Publish);
             before.try_for_each(|phase| progress.require(phase, task.count, |_| true))?;
         }
     }

@@ -32,7 +32,8 @@ pub(crate) fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStat
     };
     let Some(job) = PlannedJob::open(&directory, options, 0)? else { return Ok(simple(without_plan)) };
     let progress = JobProgressByPart::of(&job)?;
-    let phases = Phase::of_job(options.output.selects()).map(|phase| phase_status(&progress, phase, tasks)).collect();
+    let phases =
+        Phase::of_job(options.leaves_points_out()).map(|phase| phase_status(&progress, phase, tasks)).collect();
     Ok(JobStatus { phases, slowest_part: slowest(&progress), ..simple(JobState::UnderWay) })
 }
 

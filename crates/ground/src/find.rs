@@ -1,0 +1,224 @@
+//! Which cells lie on the ground, by their lowest points.
+//!
+//! It begins as the morphological filter of Pingel, Clarke and McBride 2013, "An improved simple morphological filter for the terrain
+//! classification of airborne LIDAR data": openings by larger and larger discs cut off what is narrower than they are and steeper than the ground.
+//! What they cut off where the ground goes on smoothly comes back, cell by cell, and so does what lies near the surface of the others.
+//!
+//! Each pass looks at no more than what the one before has left, within a bounded distance. So the result depends on the lowest points alone.
+//! It is computed in single precision, by additions, multiplications, divisions, square roots and comparisons in a fixed order, which have the same
+//! bits on every machine.
+
+use crate::cells::Cells;
+use crate::fill::filled;
+use crate::morphology::{EMPTY, dilation, erosion};
+use crate::sizes::GroundSizes;
+use crate::slope::slopes;
+
+/// The radius of three by three cells, in cells.
+const NEIGHBOURS: f64 = 1.5;
+/// A pit is noise if a closing by its neighbours lies so many widths of a cell above it ...
+const PIT: f32 = 3.0;
+/// ... and so many metres at least everywhere within so many metres. Else it is ground between trees.
+const LEAST_PIT: f32 = 1.0;
+const PIT_REACH: f64 = 10.0;
+/// Discs have their middles and their cells no farther than this from points, in metres.
+const EXTENSION: f64 = 4.0;
+/// Up to this radius in metres discs grow by a metre, up to the next by two, and then by a tenth.
+const BY_ONE: i32 = 6;
+const BY_TWO: i32 = 20;
+/// Cells that wide discs cut off come back first, from the ground around: an embankment is wide and steep, and meets the ground at its ends.
+const ALONG: Growth = Growth { radius: 8.0, rounds: 30, agreeing: 2, bend: 0.75, steepest: 1.5, is_covered: false };
+/// Then those that others have cut off, if the ground goes on smoothly on more sides.
+const AROUND: Growth = Growth { radius: 3.0, rounds: 10, agreeing: 3, bend: 0.5, steepest: 1.0, is_covered: true };
+/// So many times cells come back that lie near the surface of the others.
+const JOINS: usize = 3;
+/// How much farther they may lie from it on a slope of one, in widths of a cell.
+const JOIN_BY_SLOPE: f32 = 0.85;
+/// Where the surface falls by more than so many metres in a cell, what it falls by beyond adds to the tolerance so many times.
+const CLIFF: f32 = 3.0;
+const BY_CLIFF: f32 = 3.0;
+
+/// What is known of all cells.
+pub(crate) struct GroundCells {
+    /// The heights of the ground, everywhere.
+    pub(crate) surface: Cells<f32>,
+    /// The lowest points of the cells that are ground.
+    pub(crate) lowest: Cells<f32>,
+}
+
+/// Returns the ground of a cloud whose cells have these lowest points in metres, and this width. Calls `check` between passes.
+///
+/// # Errors
+/// Those of `check`.
+pub(crate) fn find_ground<E>(
+    lowest: &Cells<f32>,
+    width: f64,
+    sizes: GroundSizes,
+    check: &dyn Fn() -> Result<(), E>,
+) -> Result<GroundCells, E> {
+    let lowest = &without_pits(lowest, width);
+    let within = |radius: f64| erosion(lowest, radius).each(false, |least| least != EMPTY);
+    let (covered, reached) = (within(NEIGHBOURS), within(EXTENSION / width));
+    let surface = filled(lowest);
+    let cut = cut_off(&only_where(&surface, &reached), &covered, &reached, (width, sizes), check)?;
+    let mut kept = covered.with(&cut, false, |is_covered, radius| is_covered && radius == 0.0);
+    let terrain = Terrain { surface: &surface, covered: &covered, cut: &cut, width: width as f32 };
+    for growth in [ALONG, AROUND] {
+        for _ in 0..growth.rounds {
+            check()?;
+            kept = grown(&kept, &terrain, growth);
+        }
+    }
+    let ground = joined(lowest, only_where(lowest, &kept), width as f32, sizes.tolerance.0 as f32);
+    check()?;
+    Ok(GroundCells { surface: filled(&ground), lowest: ground })
+}
+
+/// Returns `heights` in the cells that are `wanted`.
+fn only_where(heights: &Cells<f32>, wanted: &Cells<bool>) -> Cells<f32> {
+    heights.with(wanted, EMPTY, |height, is_wanted| if is_wanted { height } else { EMPTY })
+}
+
+/// Returns the lowest points without those that are pits among their neighbours.
+fn without_pits(lowest: &Cells<f32>, width: f64) -> Cells<f32> {
+    let has_point = &lowest.each(false, |height| height != EMPTY);
+    let highest = only_where(&dilation(lowest, NEIGHBOURS), has_point);
+    let closed = only_where(&erosion(&highest, NEIGHBOURS), has_point);
+    let around = erosion(&closed, PIT_REACH / width);
+    let deep = PIT * width as f32;
+    let is_pit = lowest.with(&closed, false, |height, closed| height != EMPTY && closed - height > deep);
+    let is_noise = lowest.with(&around, false, |height, around| height != EMPTY && around - height > LEAST_PIT);
+    only_where(lowest, &is_pit.with(&is_noise, false, |is_pit, is_noise| !(is_pit && is_noise)))
+}
+
+/// Returns for each cell the radius in metres of the last opening that cut it off the `surface`, which is there where discs may reach; 0 if none
+/// did.
+fn cut_off<E>(
+    surface: &Cells<f32>,
+    covered: &Cells<bool>,
+    reached: &Cells<bool>,
+    (width, sizes): (f64, GroundSizes),
+    check: &dyn Fn() -> Result<(), E>,
+) -> Result<Cells<f32>, E> {
+    let (mut last, mut cut) = (surface.clone(), covered.each(0.0, |_| 0.0));
+    for radius in radii(sizes.largest_building.0 / 2.0) {
+        check()?;
+        // A disc just so wide has the cells at its rim.
+        let cells = radius / width + 0.01;
+        if cells < 1.0 {
+            continue;
+        }
+        let opened = only_where(&dilation(&only_where(&erosion(&last, cells), reached), cells), reached);
+        let most = (sizes.slope.0 * radius) as f32;
+        let is_high = last.with(&opened, false, |last, opened| last != EMPTY && last - opened > most);
+        let is_cut = is_high.with(covered, false, |is_high, is_covered| is_high && is_covered);
+        cut = cut.with(&is_cut, 0.0, |last, is_cut| if is_cut { radius as f32 } else { last });
+        last = opened;
+    }
+    Ok(cut)
+}
+
+/// Returns the radii of the discs in metres, up to the greatest.
+fn radii(greatest: f64) -> Vec<f64> {
+    let (by_one, by_two) = ((1..=BY_ONE).map(f64::from), (BY_ONE + 2..=BY_TWO).step_by(2).map(f64::from));
+    let mut radii: Vec<f64> = by_one.chain(by_two).take_while(|radius| *radius <= greatest).collect();
+    let mut next = f64::from(BY_TWO) * 1.1;
+    while next <= greatest {
+        radii.push(next);
+        next *= 1.1;
+    }
+    radii
+}
+
+/// The ground so far, as far as growing needs it.
+struct Terrain<'a> {
+    surface: &'a Cells<f32>,
+    covered: &'a Cells<bool>,
+    /// The radius of the last opening that cut a cell off.
+    cut: &'a Cells<f32>,
+    width: f32,
+}
+
+/// How cells that openings have cut off come back.
+#[derive(Clone, Copy, Debug)]
+struct Growth {
+    /// Only those come back that a disc of this radius in metres or a larger one cut off last.
+    radius: f32,
+    rounds: usize,
+    /// So many of the eight neighbours agree.
+    agreeing: usize,
+    /// The surface bends by no more than this between a neighbour and the opposite one, as a change of its slope.
+    bend: f32,
+    /// It is no steeper than this.
+    steepest: f32,
+    /// Whether there must be points at the opposite neighbour.
+    is_covered: bool,
+}
+
+/// The neighbours of a cell.
+const NEIGHBOUR: [[i32; 2]; 8] = [[1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]];
+
+/// Returns the cells that are `kept`, and those beside them where the ground goes on smoothly from one side to the other.
+fn grown(kept: &Cells<bool>, terrain: &Terrain, growth: Growth) -> Cells<bool> {
+    let Terrain { surface, covered, cut, width } = *terrain;
+    kept.map(false, 1, |kept| {
+        let (surface, covered) = (surface.window(kept.place, 1), covered.window(kept.place, 1));
+        let cut = cut.window(kept.place, 0);
+        let agrees = |[column, row]: [i32; 2], [right, up]: [i32; 2]| {
+            let length = if right == 0 || up == 0 { width } else { width * std::f32::consts::SQRT_2 };
+            let (here, there) = (surface.at(column, row), surface.at(column + right, row + up));
+            let opposite = surface.at(column - right, row - up);
+            kept.at(column + right, row + up)
+                && (covered.at(column - right, row - up) || !growth.is_covered)
+                && (there + opposite - 2.0 * here).abs() <= growth.bend * length
+                && (here - there).abs() <= growth.steepest * length
+        };
+        kept.each(|column, row| {
+            let may_come_back = || covered.at(column, row) && cut.at(column, row) >= growth.radius;
+            let agreeing = || NEIGHBOUR.iter().filter(|side| agrees([column, row], **side)).count();
+            kept.at(column, row) || may_come_back() && agreeing() >= growth.agreeing
+        })
+    })
+}
+
+/// Returns the `ground` with those of the `lowest` points that lie near the surface of the others.
+fn joined(lowest: &Cells<f32>, mut ground: Cells<f32>, width: f32, tolerance: f32) -> Cells<f32> {
+    let mut allowed = None;
+    for _ in 0..JOINS {
+        let surface = filled(&ground);
+        let allowed = allowed.get_or_insert_with(|| {
+            slopes(&surface, width).map(0.0, 1, |slopes| {
+                slopes.each(|column, row| {
+                    let around = NEIGHBOUR.iter().map(|[right, up]| slopes.at(column + right, row + up));
+                    allowed_distance(tolerance, JOIN_BY_SLOPE, width * around.fold(slopes.at(column, row), f32::max))
+                })
+            })
+        });
+        let distance = lowest.with(
+            &surface,
+            EMPTY,
+            |height, surface| if height == EMPTY { EMPTY } else { (height - surface).abs() },
+        );
+        let is_near = distance.with(allowed, false, |distance, allowed| distance != EMPTY && distance <= allowed);
+        let added = only_where(lowest, &is_near);
+        ground = ground.with(&added, EMPTY, |height, added| if height == EMPTY { added } else { height });
+    }
+    ground
+}
+
+/// Returns how far a point may lie from the surface where it falls by so many metres in a cell.
+pub(crate) fn allowed_distance(tolerance: f32, by_slope: f32, fall: f32) -> f32 {
+    tolerance + by_slope * fall + BY_CLIFF * (fall - CLIFF).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn discs_grow_up_to_the_largest_building() {
+        assert_eq!(radii(20.0), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0]);
+        assert_eq!(radii(2.5), [1.0, 2.0]);
+        assert_eq!(radii(25.0).len(), 15);
+    }
+}

@@ -1,0 +1,132 @@
+//! The ground of a cloud: which points lie on it.
+
+use crate::cells::{Cells, SIDE, split};
+use crate::find::{GroundCells, allowed_distance, find_ground};
+use crate::lowest::{LowestHeights, metres_above};
+use crate::morphology::EMPTY;
+use crate::scale::Scale;
+use crate::sizes::GroundSizes;
+use crate::slope::slopes;
+
+/// The bytes of memory for each cell while the ground is found, about.
+pub const BYTES_PER_CELL: u64 = 48;
+
+/// How much farther than the tolerance a point may lie from the surface on a slope of one, in widths of a cell.
+const BY_SLOPE: f32 = 1.0;
+
+/// The ground in a cell.
+#[derive(Clone, Copy, Debug)]
+struct GroundCell {
+    /// The height of the surface in metres, in the middle of the cell.
+    height: f32,
+    /// Its slope there.
+    slope: f32,
+    /// The height of the lowest point, if that is on the ground.
+    lowest: f32,
+}
+
+/// Beyond the cells of a cloud.
+const NOTHING: GroundCell = GroundCell { height: EMPTY, slope: 0.0, lowest: EMPTY };
+
+/// The ground as plain numbers, to be stored.
+#[derive(Clone, Debug)]
+pub struct GroundColumns {
+    /// What is the same in all cells.
+    pub numbers: Vec<f64>,
+    /// The columns and the rows of blocks of cells.
+    pub places: Vec<[i32; 2]>,
+    /// The heights of the surface in the cells of all blocks, and then those of the lowest points.
+    pub heights: Vec<f32>,
+}
+
+/// The ground of a cloud.
+#[derive(Debug)]
+pub struct Ground {
+    scale: Scale,
+    /// The width of a cell in lattice steps.
+    steps: i32,
+    /// The lattice height that heights in metres count from.
+    base: i32,
+    tolerance: f32,
+    cells: Cells<GroundCell>,
+}
+
+impl Ground {
+    /// Finds the ground of the cloud with these lowest points. Calls `check` now and then, to be stopped.
+    ///
+    /// # Errors
+    /// Those of `check`.
+    pub fn find<E>(lowest: &LowestHeights, sizes: GroundSizes, check: impl Fn() -> Result<(), E>) -> Result<Ground, E> {
+        let (heights, base) = lowest.metres();
+        let found = find_ground(&heights, lowest.width(), sizes, &check)?;
+        Ok(Ground::of(found, lowest.scale, lowest.steps, base, sizes.tolerance.0 as f32))
+    }
+
+    fn of(GroundCells { surface, lowest }: GroundCells, scale: Scale, steps: i32, base: i32, tolerance: f32) -> Ground {
+        let width = (f64::from(steps) * scale.horizontal) as f32;
+        let with_slopes = surface.with(&slopes(&surface, width), NOTHING, |height, slope| GroundCell {
+            height,
+            slope,
+            lowest: EMPTY,
+        });
+        let cells = with_slopes.with(&lowest, NOTHING, |cell, lowest| GroundCell { lowest, ..cell });
+        Ground { scale, steps, base, tolerance, cells }
+    }
+
+    /// Returns all that there is to know of it.
+    pub fn to_columns(&self) -> GroundColumns {
+        let Scale { horizontal, vertical } = self.scale;
+        let cells = || self.cells.values().flatten();
+        GroundColumns {
+            numbers: vec![horizontal, vertical, self.steps.into(), self.base.into(), self.tolerance.into()],
+            places: self.cells.places().to_vec(),
+            heights: cells().map(|cell| cell.height).chain(cells().map(|cell| cell.lowest)).collect(),
+        }
+    }
+
+    /// Returns the ground that [`Ground::to_columns`] has described; `None` if it has not.
+    pub fn of_columns(GroundColumns { numbers, places, heights }: GroundColumns) -> Option<Ground> {
+        let [horizontal, vertical, steps, base, tolerance] = <[f64; 5]>::try_from(numbers).ok()?;
+        let (surface, lowest) = heights.split_at(heights.len() / 2);
+        let found = GroundCells {
+            surface: Cells::of_blocks(EMPTY, places.clone(), surface)?,
+            lowest: Cells::of_blocks(EMPTY, places, lowest)?,
+        };
+        Some(Ground::of(found, Scale { horizontal, vertical }, steps as i32, base as i32, tolerance as f32))
+    }
+
+    /// Tells whether a point, given as lattice integers, lies on it.
+    pub fn has(&self, [x, y, z]: [i32; 3]) -> bool {
+        let cell = [x, y].map(|along| along.div_euclid(self.steps));
+        let (block, number) = split(cell);
+        let Some(cells) = self.cells.block(block) else { return false };
+        let own = cells[number];
+        let height = metres_above(self.base, z, self.scale);
+        if own.lowest != EMPTY && height >= own.lowest && height - own.lowest <= self.tolerance {
+            return true;
+        }
+        // From the middle of the cell, in widths.
+        let off = [x, y].map(|along| along.rem_euclid(self.steps) as f32 / self.steps as f32 - 0.5);
+        let to = off.map(|off| if off < 0.0 { -1 } else { 1 });
+        let at = |right: i32, up: i32| {
+            let [column, row] = [number as i32 % SIDE + right, number as i32 / SIDE + up];
+            let is_here = (0..SIDE).contains(&column) && (0..SIDE).contains(&row);
+            let found = if is_here {
+                cells[(row * SIDE + column) as usize]
+            } else {
+                self.cells.at([cell[0] + right, cell[1] + up])
+            };
+            if found.height == EMPTY { own } else { found }
+        };
+        let corners = [own, at(to[0], 0), at(0, to[1]), at(to[0], to[1])];
+        let [a, b] = off.map(f32::abs);
+        let weights = [(1.0 - a) * (1.0 - b), a * (1.0 - b), (1.0 - a) * b, a * b];
+        let between = |of: fn(&GroundCell) -> f32| {
+            let [p, q, r, s] = [0, 1, 2, 3].map(|corner| weights[corner] * of(&corners[corner]));
+            p + q + r + s
+        };
+        let (surface, slope) = (between(|cell| cell.height), between(|cell| cell.slope));
+        let width = (f64::from(self.steps) * self.scale.horizontal) as f32;
+        (height - surface).abs() <= allowed_distance(self.tolerance, BY_SLOPE, width * slope)
+    }
+}

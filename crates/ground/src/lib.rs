@@ -1,0 +1,22 @@
+//! Finds the points of a cloud that lie on the ground.
+
+#![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
+
+mod cells;
+mod density;
+mod fill;
+mod find;
+mod ground;
+mod lowest;
+mod morphology;
+mod scale;
+mod sizes;
+mod slope;
+#[cfg(test)]
+mod tests;
+
+pub use density::{CoveredArea, PointCollector};
+pub use ground::{BYTES_PER_CELL, Ground, GroundColumns};
+pub use lowest::LowestHeights;
+pub use scale::Scale;
+pub use sizes::GroundSizes;

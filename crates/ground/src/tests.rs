@@ -1,0 +1,167 @@
+//! Made-up scenes whose ground is known.
+
+use crate::{CoveredArea, Ground, GroundSizes, LowestHeights, PointCollector, Scale};
+
+/// Centimetres.
+const SCALE: Scale = Scale { horizontal: 0.01, vertical: 0.01 };
+
+/// A generator of numbers that look random (Steele, Lea and Flood 2014, "Fast splittable pseudorandom number generators").
+struct Random(u64);
+
+impl Random {
+    /// Returns a number from `low` to `high`.
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        low + (high - low) * ((bits ^ bits >> 31) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// What stands on the ground.
+enum Object {
+    /// A roof: its middle, its half sides and its height.
+    House([f64; 2], [f64; 2], f64),
+    /// A cone of leaves with some gaps: its middle, its radius and its height.
+    Tree([f64; 2], f64, f64),
+}
+
+impl Object {
+    /// Returns how high it stands above the ground at a place; `None` beside it.
+    fn height(&self, [x, y]: [f64; 2], gap: f64) -> Option<f64> {
+        match *self {
+            Object::House([at, up], [width, depth], height) => {
+                ((x - at).abs() < width && (y - up).abs() < depth).then_some(height)
+            }
+            Object::Tree([at, up], radius, height) => {
+                let from_middle = ((x - at).powi(2) + (y - up).powi(2)).sqrt();
+                (from_middle < radius && gap < 0.7).then(|| 1.5 + height * (1.0 - from_middle / radius))
+            }
+        }
+    }
+}
+
+/// A point, and whether it is on the ground.
+type Labelled = ([i32; 3], bool);
+
+/// Returns a scene of 100 by 100 m: waves on a slope, houses, trees, low noise and gaps without points.
+fn scene(seed: u64) -> Vec<Labelled> {
+    let mut random = Random(seed);
+    let slope = [random.within(-0.2, 0.2), random.within(-0.2, 0.2)];
+    let (length, rise) = (random.within(25.0, 60.0), random.within(0.0, 2.5));
+    let ground =
+        |[x, y]: [f64; 2]| 100.0 + slope[0] * x + slope[1] * y + rise * ((x / length).sin() + (y / length).cos());
+    let mut objects = Vec::new();
+    for _ in 0..4 {
+        let middle = [random.within(10.0, 90.0), random.within(10.0, 90.0)];
+        let sides = [random.within(3.0, 9.0), random.within(3.0, 9.0)];
+        objects.push(Object::House(middle, sides, random.within(4.0, 12.0)));
+    }
+    for _ in 0..15 {
+        let middle = [random.within(0.0, 100.0), random.within(0.0, 100.0)];
+        objects.push(Object::Tree(middle, random.within(1.5, 4.0), random.within(4.0, 15.0)));
+    }
+    let gap = [random.within(0.0, 100.0), random.within(0.0, 100.0)];
+    let spacing = random.within(0.5, 1.2);
+    let side = (100.0 / spacing) as i32;
+    let mut points = Vec::new();
+    for row in 0..side {
+        for column in 0..side {
+            let place = [column, row].map(|n| spacing * (f64::from(n) + random.within(0.0, 1.0)));
+            if (place[0] - gap[0]).abs() < 8.0 && (place[1] - gap[1]).abs() < 8.0 {
+                continue;
+            }
+            let chance = random.within(0.0, 1.0);
+            let above = objects.iter().filter_map(|object| object.height(place, chance)).reduce(f64::max);
+            let noise = (random.within(0.0, 1.0) < 3e-4).then(|| random.within(-30.0, -4.0));
+            let z = ground(place) + noise.or(above).unwrap_or(random.within(-0.04, 0.04));
+            points.push((
+                [place[0], place[1], z].map(|metres| (100.0 * metres).round() as i32),
+                noise.or(above).is_none(),
+            ));
+        }
+    }
+    points
+}
+
+fn found(points: &[Labelled]) -> Ground {
+    let all = || points.iter().map(|(point, _)| *point);
+    let mut area = CoveredArea::new(SCALE);
+    area.add(all());
+    let mut lowest = LowestHeights::new(&area);
+    lowest.add(all());
+    Ground::find(&lowest, GroundSizes::default(), || Ok::<_, ()>(())).unwrap()
+}
+
+#[test]
+fn the_ground_of_scenes_is_found() {
+    let mut worst = [0.0f64; 2];
+    for seed in 0..200 {
+        let points = scene(seed);
+        let ground = found(&points);
+        let share = |of: bool| {
+            let all = points.iter().filter(|(_, is_ground)| *is_ground == of);
+            let wrong = all.clone().filter(|(point, _)| ground.has(*point) != of).count();
+            wrong as f64 / all.count() as f64
+        };
+        let wrong = [share(true), share(false)];
+        assert!(wrong[0] < 0.05 && wrong[1] < 0.05, "{seed}: {wrong:?}");
+        worst = [worst[0].max(wrong[0]), worst[1].max(wrong[1])];
+    }
+    println!("at worst {:.4} of the ground missed, {:.4} of the objects taken for it", worst[0], worst[1]);
+}
+
+/// Adds the points to `all` in another order, piece by piece.
+fn in_pieces<C: PointCollector>(points: &[Labelled], all: &mut C) {
+    let mut pieces: Vec<C> = (0..7).map(|_| all.emptied()).collect();
+    for (number, (point, _)) in points.iter().rev().enumerate() {
+        pieces[number * number % 7].add([*point].into_iter());
+    }
+    pieces.iter().rev().for_each(|piece| all.join(piece));
+}
+
+/// Points in any order, and in any pieces, give the same ground.
+#[test]
+fn the_ground_depends_on_the_points_alone() {
+    for seed in 300..306 {
+        let points = scene(seed);
+        let expected = found(&points).to_columns();
+        let mut area = CoveredArea::new(SCALE);
+        in_pieces(&points, &mut area);
+        let mut all = LowestHeights::new(&area);
+        in_pieces(&points, &mut all);
+        let columns = Ground::find(&all, GroundSizes::default(), || Ok::<_, ()>(())).unwrap().to_columns();
+        assert_eq!((&columns.numbers, &columns.places), (&expected.numbers, &expected.places));
+        let bits = |heights: &[f32]| heights.iter().map(|height| height.to_bits()).collect::<Vec<u32>>();
+        assert!(bits(&columns.heights) == bits(&expected.heights));
+    }
+}
+
+/// What is stored and read again is the same ground.
+#[test]
+fn the_ground_can_be_stored() {
+    let points = scene(400);
+    let ground = found(&points);
+    let again = Ground::of_columns(ground.to_columns()).unwrap();
+    assert!(points.iter().all(|(point, _)| ground.has(*point) == again.has(*point)));
+    let mut columns = ground.to_columns();
+    columns.heights.pop();
+    assert!(Ground::of_columns(columns).is_none());
+}
+
+/// Clouds that are hardly any.
+#[test]
+fn few_points_and_far_ones_are_no_problem() {
+    for points in [
+        vec![],
+        vec![[0, 0, 0]],
+        vec![[i32::MIN / 2, i32::MIN / 2, i32::MIN], [i32::MAX / 2, i32::MAX / 2, i32::MAX]],
+        (0..50).map(|n| [n * 1_000_000, -n * 7_000_000, n * 100_000]).collect(),
+    ] {
+        let labelled: Vec<Labelled> = points.iter().map(|point| (*point, true)).collect();
+        let ground = found(&labelled);
+        let on_it = points.iter().filter(|point| ground.has(**point)).count();
+        assert!(on_it * 2 >= points.len(), "{on_it} of {points:?}");
+    }
+}
