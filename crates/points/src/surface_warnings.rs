@@ -32,7 +32,7 @@ pub fn no_column_of_classes() -> String {
 
 /// Returns a warning about records that do not say clearly which return they are.
 pub fn unclear_returns(options: &InputOptions, counts: &PointCounts) -> Option<String> {
-    // What is not told apart is looked at as a whole.
+    // Points that do not say their return are all used.
     if options.finds_ground() {
         return None;
     }

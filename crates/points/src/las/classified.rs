@@ -42,7 +42,7 @@ pub struct ClassifiedRecord {
 ///
 /// # Errors
 /// [`Error::Io`] if `to` cannot be written; [`Error::Input`] if the records of `from` cannot be read.
-pub fn write_classified(from: &Path, to: &Path, class_of: impl Fn(ClassifiedRecord) -> u8) -> Result<()> {
+pub fn write_classified(from: &Path, to: &Path, class_of: impl Fn(ClassifiedRecord) -> u8 + Sync) -> Result<()> {
     let file = RandomAccessFile::open(from)?;
     let head = Head::of(&file)?;
     let written = |error: std::io::Error| Error::io("write", to)(error);
@@ -53,13 +53,22 @@ pub fn write_classified(from: &Path, to: &Path, class_of: impl Fn(ClassifiedReco
         let mut compressor = LasZipCompressor::new(&mut copy, head.laz.clone())
             .map_err(|error| Error::input(from, error.to_string()))?;
         let mut records = Records::of(&file, &head)?;
-        let mut bytes = Vec::new();
-        for first in (0..head.records).step_by(RECORDS as usize) {
+        let mut read = |first: u64, bytes: &mut Vec<u8>| {
             interrupt::check()?;
-            bytes.resize((head.records - first).min(RECORDS) as usize * head.length, 0);
-            records.read(&mut bytes).map_err(|error| cannot_read(from, error))?;
-            classify(&mut bytes, &head, first, &class_of);
-            compressor.compress_many(&bytes).map_err(written)?;
+            bytes.resize(head.records.saturating_sub(first).min(RECORDS) as usize * head.length, 0);
+            records.read(bytes).map_err(|error| cannot_read(from, error))
+        };
+        let (mut bytes, mut next) = (Vec::new(), Vec::new());
+        read(0, &mut bytes)?;
+        for first in (0..head.records).step_by(RECORDS as usize) {
+            // To unpack takes as long as to pack.
+            let pack = || {
+                classify(&mut bytes, &head, first, &class_of);
+                compressor.compress_many(&bytes).map_err(written)
+            };
+            let (unpacked, packed) = rayon::join(|| read(first + RECORDS, &mut next), pack);
+            unpacked.and(packed)?;
+            std::mem::swap(&mut bytes, &mut next);
         }
         compressor.done().map_err(written)?;
     }
