@@ -2,9 +2,10 @@
 
 use crate::cloud_job::CloudOptions;
 use crate::submit::Engine;
-use clap::{Args, Parser, Subcommand, ValueHint};
+use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use clap_complete::Shell;
 use job::phase::{MOST_TASKS, Phase, Task};
+use job::progress::stage::ProgressOutput;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
@@ -21,6 +22,7 @@ Examples:
   gdt-batch view out                    look at the terrain in a browser
   gdt-batch verify out                  prove that the tiles in out are the exact Delaunay triangulation
   gdt-batch verify out --input *.laz    and that its vertices are the points of these files
+  gdt-batch diff before after           how much was cut and filled between two terrains?
 
 The shortest configuration:
   [input]
@@ -68,15 +70,41 @@ pub struct Cli {
     pub clouds: CloudOptions,
 }
 
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ShownProgress {
+    /// Bars on a terminal, lines in a log.
+    Auto,
+    /// JSON objects, one a line.
+    Json,
+}
+
+impl PrintOptions {
+    /// Returns where the progress of a job goes.
+    pub fn progress_output(self) -> ProgressOutput {
+        match (self.quiet, self.progress) {
+            (true, _) => ProgressOutput::Quiet,
+            (false, ShownProgress::Json) => ProgressOutput::Json,
+            (false, ShownProgress::Auto) => ProgressOutput::detect(),
+        }
+    }
+}
+
 /// What to print. These options may stand anywhere on the command line.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct PrintOptions {
-    /// Print only errors, a line if input files were left out, and the URL of view.
-    #[arg(long, short, global = true)]
+    /// Print only errors and essential notices.
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
+    /// Print all figures of a job: each stage, what became of all points, how tiles were triangulated.
+    #[arg(long, short, global = true)]
+    pub verbose: bool,
     /// Print the result as JSON on standard output.
     #[arg(long, global = true)]
     pub json: bool,
+    /// How to show progress on standard error: json prints a line a second for programs; auto suits a terminal or a log.
+    #[arg(long, global = true, value_name = "HOW", default_value = "auto")]
+    pub progress: ShownProgress,
 }
 
 /// The commands other than running a job.
@@ -115,6 +143,26 @@ pub enum CliCommand {
         /// The files that the job has read: prove that the vertices are their points, heights included.
         #[arg(long, num_args = 1.., value_name = "FILE")]
         input: Vec<PathBuf>,
+    },
+    /// Compute cut and fill between two terrains, exactly, over the area that both cover.
+    ///
+    /// Overlays the triangles of both. Cut is what was removed: AFTER lies below BEFORE. Fill is what was added. Both must have the same
+    /// CRS, units and vertical datum. Results in metres, and in the units of the terrains.
+    Diff(DiffOptions),
+    /// Write the heights of a terrain along lines as CSV.
+    ///
+    /// A row for each vertex of a line and each edge of the mesh that it crosses: line, distance, x, y, z, in units of the terrain. Outside of
+    /// the terrain z is empty, and so it is in a second row of the place where a line leaves the terrain.
+    Profile {
+        /// The terrain: the output directory of a finished job, or its configuration.
+        #[arg(value_hint = ValueHint::AnyPath)]
+        terrain: PathBuf,
+        /// The lines: GeoJSON, GeoPackage or Shapefile, in the CRS of the terrain or in one that leads to it.
+        #[arg(value_hint = ValueHint::FilePath)]
+        lines: PathBuf,
+        /// The file to write, replaced if it is there. Default: standard output.
+        #[arg(long, short, value_name = "FILE")]
+        output: Option<PathBuf>,
     },
     /// Show the results in a browser: serve them, and open a page with the terrain.
     ///
@@ -229,6 +277,26 @@ pub enum CliCommand {
     },
 }
 
+/// What to compare.
+#[derive(Args, Debug)]
+pub struct DiffOptions {
+    /// The earlier terrain: the output directory of a finished job, or its configuration.
+    #[arg(value_hint = ValueHint::AnyPath)]
+    pub before: PathBuf,
+    /// The later terrain.
+    #[arg(value_hint = ValueHint::AnyPath)]
+    pub after: PathBuf,
+    /// Count cut and fill only where the height changes by at least this much, in units of the heights. Default: 0.
+    #[arg(long, value_name = "HEIGHT", default_value_t = 0.0, hide_default_value = true, value_parser = threshold)]
+    pub threshold: f64,
+    /// Polygons that get figures of their own: GeoJSON, GeoPackage or Shapefile. Their attribute "name" is shown.
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub areas: Option<PathBuf>,
+    /// The memory that diff may use, such as "4 GiB".
+    #[arg(long, default_value = "4 GiB", value_parser = memory)]
+    pub memory: u64,
+}
+
 /// What to show, and to whom.
 #[derive(Args, Debug)]
 pub struct ViewOptions {
@@ -255,6 +323,11 @@ fn host_name(text: &str) -> Result<String, String> {
         return Err("give the name alone, such as maps.example.org, without http:// and without a port".into());
     }
     Ok(text.into())
+}
+
+fn threshold(text: &str) -> Result<f64, String> {
+    let height = text.parse().ok().filter(|height: &f64| height.is_finite() && *height >= 0.0);
+    height.ok_or_else(|| "give a height of 0 or more, such as 0.05".into())
 }
 
 fn memory(text: &str) -> Result<u64, String> {

@@ -3,13 +3,13 @@
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 use clap::{CommandFactory, Parser};
-use gdt_batch::cli::{Cli, CliCommand, PrintOptions, ViewOptions};
+use gdt_batch::cli::{Cli, CliCommand, DiffOptions, PrintOptions, ViewOptions};
 use gdt_batch::cli_advice::with_advice;
 use gdt_batch::cloud_job::{self, CloudJob};
 use gdt_batch::command_words::{self, Named};
 use gdt_batch::error::{Error, Result};
 use gdt_batch::exit_code::{exit_code, exit_code_of_verify};
-use gdt_batch::init::{ConfigRequest, NewConfiguration};
+use gdt_batch::init::{ConfigRequest, NewConfiguration, as_argument};
 use gdt_batch::submit::local::LocalEngine;
 use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
@@ -17,9 +17,9 @@ use gdt_batch::{completions, config, init, manual, sample};
 use job::options::{JobOptions, RunOptions, Threads};
 use job::phase::{Phase, PhaseTasks, Task};
 use job::preflight::check;
-use job::progress::stage::ProgressOutput;
 use job::report::job_report::Report;
 use job::report::skipped_inputs::skipped_summary;
+use job::report::summary::Summary;
 use job::report::task_outcome::TaskOutcome;
 use points::histogram::Histogram;
 use points::info::{SourceDescription, describe};
@@ -28,11 +28,16 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use survey::diff::{self, DiffRequest};
+use survey::profile::{self, ProfileRequest};
 use sys::threads;
 use sys::threads::on_threads;
 use sys::{interrupt, say, shortage, terminal};
 use tiles::file_names::OutputFiles;
 use verify::Conclusion;
+
+/// A file of lines may take this many bytes of memory.
+const MEMORY_FOR_LINES: u64 = 1 << 30;
 
 fn main() -> ExitCode {
     match shortage::listen(exit_code).map_err(Error::from).and_then(|()| run(command_line())) {
@@ -73,6 +78,10 @@ fn run(cli: Cli) -> Result<ExitCode> {
         }
         (Some(CliCommand::Check { config }), _) => check_job(config, print),
         (Some(CliCommand::Verify { directory, memory, input }), _) => verify_output(directory, *memory, input, print),
+        (Some(CliCommand::Diff(options)), _) => compare_terrains(options, print),
+        (Some(CliCommand::Profile { terrain, lines, output }), _) => {
+            write_profile(terrain, lines, output.as_deref(), print)
+        }
         (Some(CliCommand::View(options)), _) => view_output(options, print),
         (Some(CliCommand::Work { config, phase, task, tasks, threads, force, submission, until_stdin_ends }), _) => {
             if *until_stdin_ends {
@@ -82,7 +91,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
                 Some(task) => *task,
                 None => Task::of_environment(*phase, *tasks, |name| std::env::var(name).ok())?,
             };
-            let progress = ProgressOutput::detect(print.quiet);
+            let progress = print.progress_output();
             let run = RunOptions { progress, force: *force, restart: false, submission: *submission };
             work(config, *phase, task, *threads, run, print)
         }
@@ -135,7 +144,7 @@ fn run_job(path: &Path, cli: &Cli) -> Result<ExitCode> {
     let options = run_options(cli);
     let config = config::load(path).map_err(|error| command_words::with_endings_of_clouds(error, path))?;
     interrupt::listen(exit_code)?;
-    show_report(&job::run(&config, options)?, &config, cli.print)
+    show_report(&job::run(&config, options)?, &config, cli.print, &str::to_owned)
 }
 
 /// Returns how the command line wants a job to be run.
@@ -144,7 +153,7 @@ fn run_options(cli: &Cli) -> RunOptions {
         say("--fresh has a new name: --restart; the old one still works");
     }
     RunOptions {
-        progress: ProgressOutput::detect(cli.print.quiet),
+        progress: cli.print.progress_output(),
         force: cli.force,
         restart: cli.restart || cli.fresh,
         submission: 0,
@@ -157,28 +166,22 @@ fn run_clouds(clouds: &[PathBuf], cli: &Cli) -> Result<ExitCode> {
     if let Some(file) = &cli.clouds.write_config {
         return write_configuration(file, cli.print, || Ok(job.write_configuration(file, cli.force)?));
     }
-    let tell = |sentence: &str| {
-        if !cli.print.quiet {
-            say(sentence);
-        }
-    };
+    let tell = |sentence: &str| cli.print.progress_output().note(sentence);
     interrupt::listen(exit_code)?;
     let (report, config) = job.run(run_options(cli), tell)?;
-    let code = show_report(&report, &config, cli.print)?;
-    if !cli.print.quiet && !cli.print.json {
-        let directory = job.directory().display();
-        let next = match tiles::page::is_built_in() {
-            true => format!("look at it: gdt-batch view {}", job.directory_as_argument()),
-            false => "preview.png there shows it".into(),
-        };
-        print_text(&terminal::escape_controls(&format!("written to {directory}; {next}")))?;
-    }
-    Ok(code)
+    show_report(&report, &config, cli.print, &cloud_job::in_flags)
 }
 
-fn show_report(report: &Report, config: &JobOptions, print: PrintOptions) -> Result<ExitCode> {
-    let file = OutputFiles::new(&config.output.directory).report();
-    if let Err(error) = print_result(report, print) {
+/// Prints the report of a finished job. `words` turns the names of options into those that the user knows.
+fn show_report(
+    report: &Report,
+    config: &JobOptions,
+    print: PrintOptions,
+    words: &dyn Fn(&str) -> String,
+) -> Result<ExitCode> {
+    let files = OutputFiles::new(&config.output.directory);
+    let file = files.report();
+    if let Err(error) = print_report(report, config, print, words) {
         let done = format!("the job is done, and its report is in {}", file.display());
         if print.json {
             say(&done);
@@ -191,6 +194,28 @@ fn show_report(report: &Report, config: &JobOptions, print: PrintOptions) -> Res
         say(&format!("{summary}: see {}", file.display()));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn print_report(
+    report: &Report,
+    config: &JobOptions,
+    print: PrintOptions,
+    words: &dyn Fn(&str) -> String,
+) -> Result<()> {
+    if print.json || print.quiet {
+        return print_result(report, print);
+    }
+    if print.verbose {
+        print_result(report, print)?;
+        print_text("")?;
+    }
+    let summary = Summary::new(report, &config.output, words);
+    let directory = as_argument(&config.output.directory);
+    let next = match tiles::page::is_built_in() {
+        true => format!("gdt-batch view {directory}"),
+        false => format!("open preview.png in {directory}"),
+    };
+    print_text(&terminal::escape_controls(&format!("{summary}next      {next}")))
 }
 
 /// Does one task of one phase.
@@ -208,7 +233,7 @@ fn work(
     }
     interrupt::listen(exit_code)?;
     match job::work(&config, run, phase, task)? {
-        TaskOutcome::Published(report) => show_report(&report, &config, print),
+        TaskOutcome::Published(report) => show_report(&report, &config, print, &str::to_owned),
         TaskOutcome::Done(done) => print_result(&done, print).map(|()| ExitCode::SUCCESS),
     }
 }
@@ -317,6 +342,57 @@ fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: Print
     let first = verdict.failures.first().or(verdict.unproved.as_ref()).map_or("", String::as_str);
     say(&format!("error: {}: {}: {first}", directory.display(), verdict.sentence()));
     Ok(ExitCode::from(exit_code_of_verify(verdict.verdict)))
+}
+
+/// Compares two terrains.
+fn compare_terrains(options: &DiffOptions, print: PrintOptions) -> Result<ExitCode> {
+    interrupt::listen(exit_code)?;
+    let request = DiffRequest {
+        before: output_of(&options.before)?,
+        after: output_of(&options.after)?,
+        threshold: options.threshold,
+        areas: options.areas.clone(),
+        memory: options.memory,
+    };
+    let difference = on_threads(threads::available(), || diff::run(&request))?;
+    print_result(&difference, print).map(|()| ExitCode::SUCCESS)
+}
+
+/// Writes the heights along lines. Warnings go to standard error, since the heights may go to standard output.
+fn write_profile(terrain: &Path, lines: &Path, output: Option<&Path>, print: PrintOptions) -> Result<ExitCode> {
+    if print.json {
+        return Err(sys::Error::Config("profile writes CSV: leave out --json".into()).into());
+    }
+    interrupt::listen(exit_code)?;
+    let request = ProfileRequest { terrain: output_of(terrain)?, lines: lines.to_path_buf(), memory: MEMORY_FOR_LINES };
+    let profile = on_threads(threads::available(), || profile::run(&request))?;
+    if !print.quiet {
+        profile.warnings.iter().for_each(|warning| say(&format!("warning: {warning}")));
+    }
+    match output {
+        Some(file) => write_new_table(file, &profile.to_csv())?,
+        None => print_text(&profile.to_csv())?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a table to a file, or in place of an earlier table: nothing else is overwritten.
+fn write_new_table(file: &Path, text: &str) -> Result<()> {
+    let is_table = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+    if file.exists() && !(file.is_file() && is_table) {
+        let file = file.display();
+        return Err(sys::Error::Config(format!("{file} is there and no CSV file: name another file with -o")).into());
+    }
+    let partial = file.with_extension("csv.partial");
+    std::fs::write(&partial, text).map_err(sys::Error::io("write", &partial))?;
+    std::fs::rename(&partial, file).map_err(sys::Error::io("write", file))?;
+    Ok(())
+}
+
+/// Returns the output directory that a command line names: itself, or by the configuration of its job.
+fn output_of(path: &Path) -> Result<PathBuf> {
+    let is_configuration = path.is_file() && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
+    if is_configuration { Ok(config::load(path)?.output.directory) } else { Ok(path.to_path_buf()) }
 }
 
 /// Serves a terrain until Ctrl-C. That is how it is meant to end, so the exit code is 0 then.

@@ -54,12 +54,13 @@ const digest = (text) => `'sha256-${createHash('sha256').update(text).digest('ba
 
 const [script, style] = [await bundle('src/main.js'), await bundle('src/style.css')];
 const licences = [...(await Promise.all(packagesOf(script.inputs).map(licenceOf))), await decoderLicence()];
-// Only what is in this file may run, and nothing may come from another host. The decoder is WebAssembly; GLTFLoader reads blobs.
+// Only what is in this file may run. Which hosts may be asked, src/hosts.js says: the page's own, and the one of the images that a user names. The
+// decoder is WebAssembly; GLTFLoader reads blobs.
 const policy = [
   "default-src 'none'",
   `script-src ${digest(script.text)} 'wasm-unsafe-eval'`,
   `style-src ${digest(style.text)}`,
-  "connect-src 'self' blob: data:",
+  "connect-src 'self' blob: data: https: http:",
   "img-src 'self' blob: data:",
   "base-uri 'none'",
   "form-action 'none'",

@@ -1,9 +1,9 @@
 //! The flags of a job without a configuration: each stands for a key of one.
 
-use crate::cloud_job::options::{Bounds, CloudOptions};
+use crate::cloud_job::options::{Bounds, CloudOptions, Offset};
 use crate::config;
 use crate::init::NeededLine;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use sys::{Error, Result};
 use toml::Value;
 
@@ -16,8 +16,8 @@ pub(crate) struct Flag {
     value: fn(&CloudOptions) -> Option<Value>,
 }
 
-/// The flags that are lines of a configuration, apart from `--output`.
-const FLAGS: [Flag; 8] = [
+/// The flags that are lines of a configuration and no paths.
+const FLAGS: [Flag; 11] = [
     Flag { name: "surface", table: "input", key: "surface", value: |given| text(&given.surface) },
     Flag {
         name: "bounds",
@@ -30,28 +30,58 @@ const FLAGS: [Flag; 8] = [
     Flag { name: "unit", table: "input", key: "unit", value: |given| text(&given.unit) },
     Flag { name: "on-bad-file", table: "input", key: "on_bad_file", value: |given| text(&given.on_bad_file) },
     Flag { name: "max-error", table: "output", key: "max_error", value: |given| given.max_error.map(Value::Float) },
+    Flag {
+        name: "height-offset",
+        table: "output",
+        key: "height_offset",
+        value: |given| given.height_offset.map(offset),
+    },
     Flag { name: "raster", table: "output", key: "raster", value: |given| given.raster.map(raster) },
+    Flag { name: "export", table: "output", key: "export", value: |given| words(&given.export) },
+    Flag { name: "contours", table: "output", key: "contours", value: |given| given.contours.map(contours) },
 ];
 
-/// `--output`, which is a path and no value.
-const OUTPUT: Flag = Flag { name: "output", table: "output", key: "directory", value: |_| None };
+/// The flags that are paths: the configuration counts them from its own folder.
+const PATHS: [Flag; 2] = [
+    Flag { name: "output", table: "output", key: "directory", value: |given| path(&given.output) },
+    Flag { name: "clip", table: "input", key: "clip", value: |given| path(&given.clip) },
+];
+
+fn path(given: &Option<PathBuf>) -> Option<Value> {
+    given.as_ref().map(|path| Value::from(path.to_string_lossy().into_owned()))
+}
 
 fn text(given: &Option<String>) -> Option<Value> {
     given.as_deref().map(Value::from)
+}
+
+fn words(given: &[String]) -> Option<Value> {
+    (!given.is_empty()).then(|| given.to_vec().into())
 }
 
 fn list(sides: [f64; 4]) -> Value {
     sides.to_vec().into()
 }
 
+fn offset(given: Offset) -> Value {
+    match given {
+        Offset::Egm96 => "egm96".into(),
+        Offset::Metres(metres) => metres.into(),
+    }
+}
+
 fn raster(resolution: f64) -> Value {
     toml::Table::from_iter([("resolution".to_string(), Value::Float(resolution))]).into()
+}
+
+fn contours(interval: f64) -> Value {
+    toml::Table::from_iter([("interval".to_string(), Value::Float(interval))]).into()
 }
 
 impl Flag {
     /// Returns all flags that stand for a key.
     pub(crate) fn all() -> impl Iterator<Item = &'static Flag> {
-        [&OUTPUT].into_iter().chain(&FLAGS)
+        PATHS.iter().chain(&FLAGS)
     }
 
     /// Returns the flag as the command line has it.
@@ -84,6 +114,38 @@ pub(crate) fn option_of_flag(flag: &str) -> Option<String> {
     Flag::all().find(|known| known.name() == flag).map(Flag::option)
 }
 
+/// Returns a text in which flags take the place of the options that they stand for, such as `--unit foot` in place of
+/// `[input] unit = "foot"`.
+pub fn in_flags(text: &str) -> String {
+    let mut words = text.to_string();
+    for flag in Flag::all() {
+        let mut done = String::with_capacity(words.len());
+        let mut rest = words.as_str();
+        while let Some((before, after)) = rest.split_once(&flag.option()) {
+            let is_longer = after.starts_with(|next: char| next == '_' || next.is_alphanumeric());
+            let name = if is_longer { flag.option() } else { flag.name() };
+            done.extend([before, &name]);
+            rest = match after.strip_prefix(" = ") {
+                Some(value) if !is_longer => {
+                    done.push(' ');
+                    // A word needs no quotes there.
+                    match value.strip_prefix('"').and_then(|word| word.split_once('"')) {
+                        Some((word, rest)) if !word.contains(' ') => {
+                            done.push_str(word);
+                            rest
+                        }
+                        _ => value,
+                    }
+                }
+                _ => after,
+            };
+        }
+        done.push_str(rest);
+        words = done;
+    }
+    words
+}
+
 /// Refuses flags of point clouds beside a command.
 ///
 /// # Errors
@@ -100,8 +162,7 @@ pub fn refuse_beside_command(options: &CloudOptions) -> Result<()> {
 
 /// Returns a flag that is given and stands for a key.
 fn given(options: &CloudOptions) -> Option<&'static Flag> {
-    let output = options.output.as_ref().map(|_| &OUTPUT);
-    output.or_else(|| FLAGS.iter().find(|flag| (flag.value)(options).is_some()))
+    Flag::all().find(|flag| (flag.value)(options).is_some())
 }
 
 /// Refuses flags of point clouds beside the configuration at `path`, which has keys for them.
@@ -120,5 +181,22 @@ pub fn refuse_beside_configuration(options: &CloudOptions, path: &Path) -> Resul
             Err(Error::Config(format!("{} is for point clouds: set {} in {path}", flag.name(), flag.option())))
         }
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_in_a_text_become_flags() {
+        for (said, words) in [
+            ("set [input] unit = \"foot\"", "set --unit foot"),
+            ("[input] crs or [input] crs_of_all, [output] hull", "--crs or [input] crs_of_all, [output] hull"),
+            ("[output] raster", "--raster"),
+            ("[output.raster] resolution", "[output.raster] resolution"),
+        ] {
+            assert_eq!(in_flags(said), words);
+        }
     }
 }

@@ -8,15 +8,16 @@ mod output_name;
 
 use crate::cloud_job::flags::{Flag, lines};
 use crate::cloud_job::output_name::output_name;
-use crate::init::{ConfigRequest, Draft, NeededLine, NewConfiguration, as_argument, init, runnable, with_more};
+use crate::init::{ConfigRequest, Draft, NeededLine, NewConfiguration, init, runnable, with_more};
 use job::options::{JobOptions, RunOptions};
+use job::plan::clip::CLIP;
 use job::report::job_report::Report;
 use job::{Error, Result};
 use std::path::{Path, PathBuf};
 use sys::threads::{available, on_threads};
 
 pub(crate) use crate::cloud_job::flags::option_of_flag;
-pub use crate::cloud_job::flags::{refuse_beside_command, refuse_beside_configuration};
+pub use crate::cloud_job::flags::{in_flags, refuse_beside_command, refuse_beside_configuration};
 pub use crate::cloud_job::options::CloudOptions;
 
 /// Point clouds, and what the command line says of their job.
@@ -38,19 +39,10 @@ impl CloudJob {
             clouds: clouds.to_vec(),
             lines,
             directory: Some(directory.clone()),
+            clip: options.clip.clone(),
             stops_at_bad_files: true,
         };
         Ok(CloudJob { request, directory })
-    }
-
-    /// Returns the output directory.
-    pub fn directory(&self) -> &Path {
-        &self.directory
-    }
-
-    /// Returns the output directory as an argument of a command that a shell reads.
-    pub fn directory_as_argument(&self) -> String {
-        as_argument(&self.directory)
     }
 
     /// Writes the configuration of the job to `file`, and runs nothing.
@@ -104,7 +96,9 @@ fn may_be_cured(error: &Error) -> bool {
     let is_full = |error: &std::io::Error| error.kind() == std::io::ErrorKind::StorageFull;
     match error {
         Error::System(sys::Error::Io { source, .. }) => is_full(source),
-        Error::System(sys::Error::Config(_) | sys::Error::Memory(_)) => true,
+        // Whatever is wrong with the file of a clip, the points stay in their own CRS.
+        Error::System(sys::Error::Config(what)) => !what.starts_with(CLIP),
+        Error::System(sys::Error::Memory(_)) => true,
         _ => false,
     }
 }

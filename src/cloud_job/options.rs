@@ -22,9 +22,18 @@ pub struct CloudOptions {
     /// Also write the heights as terrain.tif, with cells of this side, in the unit of x and y.
     #[arg(long, value_name = "SIDE", value_parser = number, allow_negative_numbers = true)]
     pub raster: Option<f64>,
+    /// Also write the mesh for CAD and other programs: landxml, dxf, obj, ply; several with commas.
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', value_parser = choice("[output]", "export"))]
+    pub export: Vec<String>,
+    /// Also write contour lines as contours.gpkg, with this height from one to the next, in the unit of heights.
+    #[arg(long, value_name = "INTERVAL", value_parser = number, allow_negative_numbers = true)]
+    pub contours: Option<f64>,
     /// Keep only the points in this rectangle, in the coordinates of the files; with --to-crs, in those of that system.
     #[arg(long, value_name = "XMIN,YMIN,XMAX,YMAX", allow_hyphen_values = true)]
     pub bounds: Option<Bounds>,
+    /// Keep only the points within the polygons of this file: GeoJSON, GeoPackage or Shapefile, in any coordinate reference system.
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub clip: Option<PathBuf>,
     /// Transform all points into this coordinate reference system: utm, or a code such as EPSG:26915.
     #[arg(long, value_name = "CRS")]
     pub to_crs: Option<String>,
@@ -34,6 +43,9 @@ pub struct CloudOptions {
     /// The unit of x and y, if the files name none.
     #[arg(long, value_name = "UNIT", value_parser = choice("[input]", "unit"))]
     pub unit: Option<String>,
+    /// What to add to heights so that they are above the ellipsoid, as the globe needs them: egm96, or metres.
+    #[arg(long, value_name = "OFFSET", value_parser = offset, allow_negative_numbers = true)]
+    pub height_offset: Option<Offset>,
     /// What to do about a file that is damaged or no point cloud: stop, or leave it out.
     #[arg(long, value_name = "WHAT", value_parser = choice("[input]", "on_bad_file"))]
     pub on_bad_file: Option<String>,
@@ -45,6 +57,23 @@ pub struct CloudOptions {
 /// Returns what reads one of the words that an option of a configuration takes.
 fn choice(table: &str, key: &str) -> PossibleValuesParser {
     PossibleValuesParser::new(config::choices(table, key))
+}
+
+/// What to add to heights.
+#[derive(Clone, Copy, Debug)]
+pub enum Offset {
+    /// The heights of a geoid that is built in.
+    Egm96,
+    /// So many metres.
+    Metres(f64),
+}
+
+fn offset(text: &str) -> Result<Offset, String> {
+    match (text, text.parse()) {
+        ("egm96", _) => Ok(Offset::Egm96),
+        (_, Ok(metres)) => Ok(Offset::Metres(metres)),
+        _ => Err("give egm96 or a number of metres; a geoid grid goes into a configuration, see --write-config".into()),
+    }
 }
 
 fn number(text: &str) -> Result<f64, String> {
@@ -59,10 +88,12 @@ impl FromStr for Bounds {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Bounds, String> {
-        let numbers: Vec<&str> =
-            text.trim_matches(['[', ']', ' ']).split([',', ' ']).filter(|n| !n.is_empty()).collect();
-        let numbers: std::result::Result<Vec<f64>, _> = numbers.iter().map(|number| number.parse()).collect();
-        let sides = numbers.ok().and_then(|numbers| numbers.try_into().ok());
+        let numbers = text.split(['(', '[', ',', ' ', ']', ')']).filter(|number| !number.is_empty());
+        let numbers: std::result::Result<Vec<f64>, _> = numbers.map(str::parse).collect();
+        let sides = numbers.ok().and_then(|numbers| <[f64; 4]>::try_from(numbers).ok());
+        // PDAL writes ([xmin, xmax], [ymin, ymax]).
+        let is_by_axis = text.trim_start().starts_with('(');
+        let sides = sides.map(|[a, b, c, d]| if is_by_axis { [a, c, b, d] } else { [a, b, c, d] });
         sides.map(Bounds).ok_or("give four numbers, xmin,ymin,xmax,ymax, such as 565000,5933000,565400,5933400".into())
     }
 }
@@ -76,6 +107,7 @@ mod tests {
         for text in ["1,-2.5,3,4", "[1, -2.5, 3, 4]", "1 -2.5 3 4"] {
             assert_eq!(text.parse::<Bounds>().unwrap().0, [1.0, -2.5, 3.0, 4.0]);
         }
+        assert_eq!("([1, 3], [-2.5, 4])".parse::<Bounds>().unwrap().0, [1.0, -2.5, 3.0, 4.0]);
         for text in ["", "1,2,3", "1,2,3,4,5", "1;2;3;4", "a,b,c,d"] {
             assert!(text.parse::<Bounds>().unwrap_err().contains("xmin,ymin,xmax,ymax"), "{text}");
         }

@@ -12,6 +12,10 @@ pub(crate) fn is_taken(table: &str, key: &str, value: &Value) -> bool {
 pub(crate) fn refusal(table: &str, key: &str, value: &Value) -> Option<String> {
     let names: Vec<&str> = table.trim_matches(['[', ']']).split('.').collect();
     let mut own = needed_keys(table);
+    if (table, key) == ("[output.contours]", "levels") {
+        // There is one or the other.
+        own.remove("interval");
+    }
     own.insert(key.into(), value.clone());
     let mut own: Value = if table.starts_with("[[") { vec![own].into() } else { own.into() };
     let [first, inner @ ..] = &names[..] else { return None };
@@ -34,6 +38,7 @@ fn needed_keys(table: &str) -> Table {
     let needed = match table {
         "[input]" | "[[breaklines]]" => Some(("files", files())),
         "[output]" => Some(("directory", "a".into())),
+        "[output.contours]" => Some(("interval", Value::Float(1.0))),
         "[output.raster]" => Some(("resolution", Value::Float(1.0))),
         _ => None,
     };

@@ -125,6 +125,11 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
         let Anchored { base, path } = anchor("[output] height_offset", &name, base)?;
         *grid = base.join(path);
     }
+    if let Some(clip) = options.input.clip.as_mut() {
+        refuse_url("[input] clip", clip)?;
+        let Anchored { base, path } = anchor("[input] clip", clip, base)?;
+        *clip = base.join(path).to_string_lossy().into_owned();
+    }
     // A shell's signs mean other things in a URL.
     let of_points = options.input.files.iter_mut().filter(|file| !is_by_url(file)).map(|file| ("[input] files", file));
     let line_files = || options.breaklines.iter().flat_map(|lines| &lines.files);

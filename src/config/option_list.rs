@@ -177,8 +177,10 @@ mod tests {
             ("[input]", "files", &[]),
             ("[[breaklines]]", "kind", &["line", "river", "lake"]),
             ("[output]", "attributes", &["classification", "intensity"]),
+            ("[output]", "export", &["landxml", "dxf", "obj", "ply"]),
             ("[output]", "format", &["3dtiles", "glb", "auto"]),
             ("[output.raster]", "compression", &["deflate", "none"]),
+            ("[output.raster]", "products", &["height", "hillshade", "slope", "aspect"]),
             ("[output]", "copyright", &[]),
         ] {
             assert_eq!(ConfigOption::find(table, key).unwrap().choices(), choices, "{table} {key}");
@@ -192,6 +194,7 @@ mod tests {
             "[gpu]",
             "[output]",
             "[output.raster]",
+            "[output.contours]",
             "[limits]",
         ];
         assert_eq!(super::tables(), tables);

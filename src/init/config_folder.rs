@@ -85,6 +85,22 @@ impl ConfigFolder {
         }
     }
 
+    /// Returns what the configuration calls the file at `path` where it takes no pattern.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if there is no such file, or its path is not UTF-8.
+    pub(crate) fn file(&self, path: &Path) -> Result<String> {
+        if !path.exists() {
+            return Err(Error::Config(format!("there is no file {}", path.display())));
+        }
+        let folder = self.way_to(path.parent().unwrap_or(Path::new("")))?;
+        match folder.join(path.file_name().unwrap_or_default()).to_str() {
+            Some(text) if cfg!(windows) => Ok(text.replace('\\', "/")),
+            Some(text) => Ok(text.to_string()),
+            None => Err(Error::Config(format!("{}: the name is not UTF-8: rename the file", path.display()))),
+        }
+    }
+
     /// Returns the path of a folder as it counts from here. It stays as the user wrote it where that leads to the same place.
     fn way_to(&self, folder: &Path) -> Result<PathBuf> {
         if self.is_current && folder.is_relative() {

@@ -146,6 +146,12 @@ fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight, plan: &Pl
     if !draft.sets("raster") {
         page.offer(&raster, "also writes the heights as terrain.tif, with cells of this side");
     }
+    if !draft.sets("export") {
+        page.offer(
+            "export = [\"landxml\"]",
+            "also writes terrain.xml for CAD; \"dxf\", \"obj\" and \"ply\" for other programs",
+        );
+    }
     page.offer("height_offset = \"egm96\"", "if heights count from the sea: then they are right on the globe");
     page.offer("copyright = \"(c) whose data\"", "goes into every file, and viewers show it");
     if is_built_in() {

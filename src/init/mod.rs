@@ -36,6 +36,7 @@ use job::{Error, Result};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use sys::ShownWarning;
 use sys::terminal::is_obeyed;
 
 pub(crate) use crate::init::config_file::is_configuration;
@@ -90,6 +91,8 @@ pub struct ConfigRequest {
     pub lines: Vec<NeededLine>,
     /// The output directory. Without one, a free one beside the configuration is taken.
     pub directory: Option<PathBuf>,
+    /// The file whose polygons points are kept in.
+    pub clip: Option<PathBuf>,
     /// Whether a bad file stops the job until the user has decided. Otherwise the configuration leaves it out, and says so.
     pub stops_at_bad_files: bool,
 }
@@ -108,8 +111,11 @@ impl ConfigRequest {
             None => free_directory(&folder.path, file)?,
         };
         config::check_directory(&directory, &folder.path)?;
+        let clip = self.clip.as_ref().map(|clip| folder.file(clip)).transpose()?;
+        let clip = clip.map(|clip| NeededLine::chosen("input", "clip", &clip.into()));
+        let chosen = self.lines.iter().cloned().chain(clip).collect();
         let draft = Draft::new(patterns, directory, &folder);
-        Ok((Draft { chosen: self.lines.clone(), stops_at_bad_files: self.stops_at_bad_files, ..draft }, notes))
+        Ok((Draft { chosen, stops_at_bad_files: self.stops_at_bad_files, ..draft }, notes))
     }
 }
 
@@ -187,7 +193,7 @@ pub(crate) fn plain(name: &str) -> String {
 }
 
 /// Returns a file as an argument of a command that a shell reads.
-pub(crate) fn as_argument(file: &Path) -> String {
+pub fn as_argument(file: &Path) -> String {
     let name = file.display().to_string();
     quoted(&if name.starts_with('-') { format!("./{name}") } else { name })
 }
@@ -207,7 +213,7 @@ impl fmt::Display for NewConfiguration {
         self.choices.iter().try_for_each(|line| row("decide", choice_of(line)))?;
         self.notes.iter().try_for_each(|note| row("note", note.clone()))?;
         for warning in warnings.iter() {
-            writeln!(f, "warning: {}", escape_controls(warning))?;
+            writeln!(f, "{}", ShownWarning(warning))?;
         }
         match &self.file {
             Some(file) => {

@@ -8,6 +8,7 @@ use crate::init::refusals::Refusals;
 use crate::init::suspect_heights::line_for_nodata;
 use crate::init::systems::CrsAttempts;
 use crate::init::triangle::may_have_triangle;
+use job::plan::clip::CLIP;
 use job::plan::job_plan::{Plan, PlannedInput};
 use job::plan::no_points::{no_point_is_left, no_triangle};
 use job::plan::text_inputs::{allowed_malformed, count, stop_at};
@@ -60,6 +61,9 @@ pub(crate) fn runnable(draft: Draft) -> Result<Runnable> {
                     None => line_for_far_points(&now, &error).map(|line| now.with([line])),
                 };
                 (error.into(), next)
+            }
+            Err(Error::System(sys::Error::Config(what))) if what.starts_with(CLIP) => {
+                return Err(sys::Error::Config(what).into());
             }
             Err(error @ Error::System(sys::Error::Config(_))) => {
                 let ways = match &mut ways {

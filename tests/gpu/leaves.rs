@@ -224,7 +224,7 @@ impl SampleJobs {
         );
         std::fs::write(&path, text).unwrap();
         let config = gdt_batch::config::load(&path).unwrap();
-        let report = job::run(&config, ProgressOutput::detect(true)).unwrap();
+        let report = job::run(&config, ProgressOutput::Quiet).unwrap();
         let outcome = report.leaves.outcome;
         if config.triangulation.backend == Backend::Gpu {
             assert!(

@@ -100,7 +100,8 @@ fn extreme_scales_and_offsets_are_decoded_exactly_or_refused() {
             let map = AxisMap::new(own.offset, own.scale, own.offset, own.scale).unwrap();
             let (maps, classes) = ([map; 3], [true; 256]);
             let (returns, fields) = (KeptReturns::All, OptionalFields::default());
-            let rules = PointRules { maps, classes, returns, bounds: None, first_order: 0, numbered: true, fields };
+            let rules =
+                PointRules { maps, classes, returns, bounds: None, clip: None, first_order: 0, numbered: true, fields };
             let (points, counts) = decode(&source, &rules).unwrap();
             // The first two records lie outside the reach of the lattice, and the fourth is withheld.
             assert_eq!((points.len(), counts.malformed), (7, 2), "{scale:e} and {offset:e}");

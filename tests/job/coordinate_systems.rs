@@ -161,9 +161,12 @@ fn the_unit_of_a_false_record_gives_way_to_every_other_statement() {
         assert_eq!(Job::on(&[&texas, record]).with("input", lines).report()["crs"], "NAD83 / UTM zone 14N");
     }
     let said = warnings(&Job::on(&[&silent]).report());
-    assert!(said.contains("no input says a unit of length that is known: coordinates are taken as metres"), "{said}");
+    assert!(said.contains("no input states a known unit of length: metres assumed; fix: set [input] unit"), "{said}");
     let said = warnings(&Job::on(&[&in_metres]).report());
-    assert!(said.contains("taken as a plane in the unit metre") && !said.contains("no input says a unit"), "{said}");
+    assert!(
+        said.contains("taken as a plane in the unit metre") && !said.contains("no input states a known unit"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -342,7 +345,7 @@ fn a_unit_that_is_no_length_is_named() {
         let said = warnings(&Job::on(&[&file]).report());
         let named = format!("its coordinate system (UTM_15N): its unit of x and y is Meter with {shown}");
         assert!(said.contains("bad.las") && said.contains(&named), "{said}");
-        assert!(said.contains("no input says a unit of length"), "{said}");
+        assert!(said.contains("no input states a known unit of length"), "{said}");
     }
 }
 

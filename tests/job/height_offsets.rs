@@ -191,7 +191,9 @@ fn heights_that_may_count_from_the_sea_are_warned_of_once_they_are_on_the_globe(
         write(folder.path(), name, &[keys(&[[1024, 0, 1, 1], [3072, 0, 1, 26915], [4096, 0, 1, heights]])])
     };
     let silent = write(folder.path(), "silent.las", &[code(26915)]);
-    for (path, words) in [(&silent, "no input says from what"), (&coded("navd88.las", 5703), "count from EPSG:5703")] {
+    for (path, words) in
+        [(&silent, "vertical datum unknown"), (&coded("navd88.las", 5703), "heights are above EPSG:5703")]
+    {
         let job = Job::on(&[path]);
         let said = warnings(&job.report());
         assert!(said.contains(words) && said.contains("height_offset") && said.contains("egm96"), "{said}");

@@ -241,7 +241,7 @@ fn what_hull_and_max_edge_leave_out_is_counted_apart() {
     let file = clouds::write(folder.path(), "cloud.csv", &bay(9_000));
     let hull = number(&Job::on(&[&file]).report()["hull_triangles"]);
     let job = Job::on(&[&file]).tiles_of(500).with("output", "max_edge = 6000.0");
-    let said = job.run().succeeded();
+    let said = job.run_with(&["--verbose"]).succeeded();
     let report: Value = serde_json::from_slice(&fs::read(job.out().join("report.json")).unwrap()).unwrap();
     let cut = number(&report["cut_triangles"]);
     assert!(hull > 0 && number(&report["hull_triangles"]) == hull && cut > hull, "{hull}, {cut}");

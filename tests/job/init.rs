@@ -33,7 +33,7 @@ const NO_UNIT: &str = "no file says it";
 const METRES: &str = "metre in x and y, metre in z";
 /// No record says the unit of heights.
 const METRES_IN_XY: &str = "metre in x and y";
-const NO_CLASSES: &str = "the points are not classified";
+const NO_CLASSES: &str = "points are unclassified";
 /// Files of PDAL's stadium: a foot is no metre, but two of them name no system.
 const STADIUM: &str = "26 % ground";
 const UNKNOWN: Expected = Expected {

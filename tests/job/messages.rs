@@ -238,13 +238,26 @@ fn quiet_prints_nothing_and_json_prints_only_json() {
     let (_folder, job) = small_job();
     let quiet = job.run_with(&["--quiet"]).succeeded();
     assert_eq!((quiet.out.as_str(), quiet.err.as_str()), ("", ""));
-    let loud = job.run().succeeded();
-    for words in ["points read", "triangles", "tiles", "peak memory", "triangulate"] {
+    let summary = job.run().succeeded().out;
+    for words in ["triangles between 5 000 points", "Delaunay triangulation", "tileset.json", "preview.png", "next "] {
+        assert!(summary.contains(words), "{words}: {summary}");
+    }
+    assert!(
+        summary.lines().filter(|line| !line.contains("warning") && !line.contains("fix:")).count() <= 8,
+        "{summary}"
+    );
+    let loud = job.run_with(&["--verbose"]).succeeded();
+    for words in ["points read", "peak memory", "triangulate", summary.lines().next().unwrap()] {
         assert!(loud.out.contains(words), "{words}: {}", loud.out);
     }
     assert!(loud.err.contains("mesh: done"), "a log gets a line for each stage: {}", loud.err);
     let json = job.run_with(&["--json", "-q"]).succeeded();
     assert_eq!(json.err, "");
+    let lines = job.run_with(&["--progress", "json"]).succeeded().err;
+    let mesh =
+        |line: &serde_json::Value| line["stage"] == "mesh" && line["finished"] == true && line["done"] == line["total"];
+    let lines: Vec<serde_json::Value> = lines.lines().map(|line| serde_json::from_str(line).expect(line)).collect();
+    assert!(lines.iter().any(mesh), "{lines:?}");
     let stages = json.json()["stages"].as_array().unwrap().len();
     assert!(stages >= 5, "{stages} stages");
     let quiet = gdt_batch(job.folder(), &["verify", "out", "-q"]).succeeded();

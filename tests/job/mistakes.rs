@@ -65,7 +65,7 @@ const IN_INPUT: [(&str, &[&str]); 19] = [
 ];
 
 /// A line for `[output]`, and what the message has.
-const IN_OUTPUT: [(&str, &[&str]); 15] = [
+const IN_OUTPUT: [(&str, &[&str]); 16] = [
     ("raster = 2.0", &["line 5: [output] raster takes a table", "did you mean raster = { resolution = 2.0 }?"]),
     ("[output.raster]\norigin = [0, 0]", &["line 5: [output.raster] has no key resolution", "resolution = 1.0"]),
     (
@@ -88,6 +88,10 @@ const IN_OUTPUT: [(&str, &[&str]); 15] = [
     (
         "attributes = [\"clasification\"]",
         &["line 5: [output] attributes is a list of", "did you mean attributes = [\"classification\"]?"],
+    ),
+    (
+        "export = [\"obj\", \"land-xml\"]",
+        &["line 5: [output] export is a list of formats: \"landxml\"", "did you mean export = [\"obj\", \"landxml\"]?"],
     ),
     ("[limits]\nthreads = \"4\"", &["line 6: [limits] threads takes a number; did you mean threads = 4?"]),
     ("[limits]\nmemory = 8", &["line 6: [limits] memory takes text", "did you mean memory = \"8 GiB\"?"]),

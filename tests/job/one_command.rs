@@ -34,15 +34,22 @@ fn a_job_has_the_bytes_of_its_configuration() {
     let folder = folder_with_clouds();
     let root = folder.path();
     let square = "565000,5933000,565020.5,5933020";
+    let crs = r#""crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}"#;
+    let ring = "[[565000, 5933000], [565090, 5933010], [565020, 5933080], [565000, 5933000]]";
+    fs::write(root.join("area.geojson"), format!(r#"{{"type": "Polygon", {crs}, "coordinates": [{ring}]}}"#)).unwrap();
     for (words, out) in [
         (&["cloud.copc.las"][..], "cloud-terrain"),
         (&["my tiles"], "my tiles-terrain"),
         (&["my tiles/*.laz", "--surface", "ground", "--max-error", "0.05"], "my tiles-terrain"),
-        (&["my tiles/b.laz", "my tiles/Größe 1.laz", "--raster", "2", "--bounds", square], "my tiles-terrain"),
+        (
+            &["my tiles/b.laz", "my tiles/Größe 1.laz", "--raster", "2", "--bounds", square, "--export", "ply,obj"],
+            "my tiles-terrain",
+        ),
+        (&["cloud.copc.las", "--clip", "area.geojson"], "cloud-terrain"),
         (&["my tiles", "cloud.copc.las", "-o", "out/of two", "--to-crs", "EPSG:25833"], "out/of two"),
         // What the clouds need is set in both.
         (&["degrees.csv"], "degrees-terrain"),
-        (&["degrees.csv", "--to-crs", "EPSG:32633", "--raster", "500"], "degrees-terrain"),
+        (&["degrees.csv", "--to-crs", "EPSG:32633", "--raster", "500", "--contours", "0.5"], "degrees-terrain"),
     ] {
         gdt_batch(root, &[words, &["--quiet"]].concat()).succeeded();
         let own = results(&root.join(out));
@@ -57,6 +64,7 @@ fn a_job_has_the_bytes_of_its_configuration() {
             fs::remove_file(root.join(file)).unwrap();
         }
         assert_eq!(own.contains("terrain.tif"), words.contains(&"--raster"), "{words:?}");
+        assert_eq!(own.contains("terrain.ply"), words.contains(&"--export"), "{words:?}");
     }
 }
 
@@ -67,7 +75,7 @@ fn what_is_written_and_what_comes_next_is_said() {
     assert!(said.err.starts_with("the terrain goes to b-terrain\n"), "{}", said.err);
     let last = said.out.lines().last().unwrap();
     let next = if tiles::page::is_built_in() { "gdt-batch view b-terrain" } else { "preview.png" };
-    assert!(last.starts_with("written to b-terrain; ") && last.contains(next), "{last}");
+    assert!(last.starts_with("next ") && last.contains(next), "{last}");
     // Reasons for what no flag has set.
     let said = gdt_batch(folder.path(), &["degrees.csv"]).succeeded();
     assert!(said.err.contains("[input] to_crs = \"utm\": ") && said.err.contains("[input] missing_crs = "), "{said:?}");
@@ -81,7 +89,21 @@ fn what_is_written_and_what_comes_next_is_said() {
 fn the_written_configuration_has_the_flags_and_offers_none_of_them_again() {
     let folder = folder_with_clouds();
     let root = folder.path();
-    let flags = ["--surface", "ground", "--unit", "metre", "--raster", "1", "--max-error", "0.1"];
+    let flags = [
+        "--surface",
+        "ground",
+        "--unit",
+        "metre",
+        "--raster",
+        "1",
+        "--contours",
+        "2",
+        "--max-error",
+        "0.1",
+        "--export",
+        "landxml",
+        "--export=dxf",
+    ];
     let words = [&["my tiles", "--bounds", "-1,2,3e6,4e7", "--write-config", "-"], &flags[..]].concat();
     let text = gdt_batch(root, &words).succeeded().out;
     for line in [
@@ -90,12 +112,14 @@ fn the_written_configuration_has_the_flags_and_offers_none_of_them_again() {
         "unit = \"metre\"",
         "max_error = 0.1",
         "raster = { resolution = 1.0 }",
+        "export = [\"landxml\", \"dxf\"]",
+        "contours = { interval = 2.0 }",
         "directory = \"my tiles-terrain\"",
         "files = [\"my tiles/*.laz\"]",
     ] {
         assert!(text.contains(&format!("\n{line}\n")), "{line}: {text}");
     }
-    for key in ["bounds", "surface", "unit", "max_error", "raster"] {
+    for key in ["bounds", "surface", "unit", "max_error", "raster", "contours", "export"] {
         assert!(!text.contains(&format!("#{key} ")), "{key}: {text}");
     }
     assert!(!root.join("my tiles-terrain").exists());
@@ -129,7 +153,11 @@ fn configurations_and_point_clouds_do_not_mix() {
         (&["degrees.csv", "--bounds", "3,2,1"], "xmin,ymin,xmax,ymax"),
         (&["degrees.csv", "--max-error", "-1"], "--max-error: "),
         (&["degrees.csv", "--raster", "0"], "--raster: "),
+        (&["degrees.csv", "--export", "ply,landxm"], "a similar value exists: 'landxml'"),
+        (&["degrees.csv", "--contours", "0"], "--contours: "),
         (&["degrees.csv", "--bounds", "1,1,0,0"], "--bounds: "),
+        (&["degrees.csv", "--clip", "no.gpkg"], "there is no file no.gpkg"),
+        (&["job.toml", "--clip", "area.gpkg"], "--clip is for point clouds: set [input] clip in job.toml"),
         (&["degrees.csv", "-o", "degrees.csv"], "degrees.csv is not a directory"),
     ] {
         gdt_batch(root, words).refused(2, &[told]);

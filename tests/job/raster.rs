@@ -34,6 +34,11 @@ struct Raster {
     keys: Vec<u32>,
 }
 
+/// Returns the cells of a raster of one file, without its overviews.
+fn cells(job: &Job, file: &str) -> DecodingResult {
+    Decoder::new(BufReader::new(File::open(job.out().join(file)).unwrap())).unwrap().read_image().unwrap()
+}
+
 fn bytes(job: &Job) -> Vec<u8> {
     fs::read(job.out().join("terrain.tif")).unwrap()
 }
@@ -272,6 +277,31 @@ fn attributes<const N: usize>(line: &str, names: [&str; N]) -> [usize; N] {
     })
 }
 
+/// Returns the cells of a grid of floating-point files, and the lines that name the files. It must have the place and the size of `whole`.
+#[track_caller]
+fn cells_of_files(job: &Job, list: &str, whole: &Raster) -> (Vec<f32>, Vec<String>) {
+    let list = fs::read_to_string(job.out().join(list)).unwrap();
+    let lines =
+        |name: &str| list.lines().filter(move |line| line.contains(name)).map(str::to_owned).collect::<Vec<_>>();
+    let [width, height] = attributes(&lines("<VRTDataset")[0], ["rasterXSize", "rasterYSize"]);
+    assert_eq!((width, height), (whole.images[0].width, whole.images[0].height));
+    let mut cells = vec![-9999.0; width * height];
+    let (names, places) = (lines("<SourceFilename"), lines("<DstRect"));
+    for (name, place) in names.iter().zip(&places) {
+        let uri = name.split(['>', '<']).nth(2).unwrap();
+        let [left, top, columns, rows] = attributes(place, ["xOff", "yOff", "xSize", "ySize"]);
+        let mut decoder = Decoder::new(BufReader::new(File::open(job.out().join(uri)).unwrap())).unwrap();
+        assert_eq!(decoder.dimensions().unwrap(), (columns as u32, rows as u32));
+        let corner = decoder.get_tag_f64_vec(Tag::Unknown(33922)).unwrap();
+        assert_eq!(corner[3..5], [whole.corner[0] + 9.0 * left as f64, whole.corner[1] - 9.0 * top as f64]);
+        let DecodingResult::F32(own) = decoder.read_image().unwrap() else { panic!("not of single precision") };
+        for (row, own) in own.chunks(columns).enumerate() {
+            cells[(top + row) * width + left..][..columns].copy_from_slice(own);
+        }
+    }
+    (cells, names)
+}
+
 #[test]
 fn a_grid_of_files_has_the_cells_of_the_one_file() {
     // A ring, so that there are files without any tile.
@@ -288,26 +318,7 @@ fn a_grid_of_files_has_the_cells_of_the_one_file() {
     let image = &raster(&whole).images[0];
     let parts = job(", cells_per_file = 512");
     let report = parts.report();
-    let list = fs::read_to_string(parts.out().join("terrain.vrt")).unwrap();
-    let lines =
-        |name: &str| list.lines().filter(move |line| line.contains(name)).map(str::to_owned).collect::<Vec<_>>();
-    let [width, height] = attributes(&lines("<VRTDataset")[0], ["rasterXSize", "rasterYSize"]);
-    assert_eq!((width, height), (image.width, image.height));
-    let mut cells = vec![-9999.0; width * height];
-    let (names, places) = (lines("<SourceFilename"), lines("<DstRect"));
-    for (name, place) in names.iter().zip(&places) {
-        let uri = name.split(['>', '<']).nth(2).unwrap();
-        let [left, top, columns, rows] = attributes(place, ["xOff", "yOff", "xSize", "ySize"]);
-        let mut decoder = Decoder::new(BufReader::new(File::open(parts.out().join(uri)).unwrap())).unwrap();
-        assert_eq!(decoder.dimensions().unwrap(), (columns as u32, rows as u32));
-        let corner = decoder.get_tag_f64_vec(Tag::Unknown(33922)).unwrap();
-        let expected = [raster(&whole).corner[0] + 9.0 * left as f64, raster(&whole).corner[1] - 9.0 * top as f64];
-        assert_eq!(corner[3..5], expected);
-        let DecodingResult::F32(own) = decoder.read_image().unwrap() else { panic!("not of single precision") };
-        for (row, own) in own.chunks(columns).enumerate() {
-            cells[(top + row) * width + left..][..columns].copy_from_slice(own);
-        }
-    }
+    let (cells, names) = cells_of_files(&parts, "terrain.vrt", &raster(&whole));
     assert!(cells == image.cells);
     let [files, heights] = ["files", "heights"].map(|key| number(&report["raster"][key]));
     let with_height = image.cells.iter().filter(|z| **z != -9999.0).count();
@@ -323,6 +334,69 @@ fn a_grid_of_files_has_the_cells_of_the_one_file() {
     gdt_batch(by_parts.folder(), &["job.toml"]).succeeded();
     assert!(by_parts.out().join("terrain.tif").exists());
     assert!(!by_parts.out().join("terrain.vrt").exists() && !by_parts.out().join("raster").exists());
+}
+
+/// The rasters that follow from the heights have, in every cell of the terrain, what Horn's formulas have there; in any tiling, and in
+/// files whose cells have their neighbours in other files.
+#[test]
+fn slopes_and_shades_follow_from_the_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &hills(8_000, 3));
+    let job = |per_tile, options: &str| {
+        let options =
+            format!("resolution = 9.0, products = [\"slope\", \"hillshade\", \"aspect\", \"height\"]{options}");
+        let job = with_raster(Job::on(&[&cloud]).tiles_of(per_tile), &options);
+        (job.report(), job)
+    };
+    let (report, whole) = job(1_000, "");
+    assert_eq!(report["raster"]["products"], serde_json::json!(["height", "hillshade", "slope", "aspect"]));
+    let raster = raster(&whole);
+    let Image { width, height, cells: heights } = &raster.images[0];
+    let (DecodingResult::F32(slopes), DecodingResult::F32(aspects), DecodingResult::U8(shades)) =
+        (cells(&whole, "slope.tif"), cells(&whole, "aspect.tif"), cells(&whole, "hillshade.tif"))
+    else {
+        panic!("rasters of other numbers")
+    };
+    let mut inner = 0;
+    for number in 0..heights.len() {
+        let has_height = heights[number] != -9999.0;
+        assert_eq!((slopes[number] != -9999.0, shades[number] != 0), (has_height, has_height), "cell {number}");
+        let (column, row) = (number % width, number / width);
+        if column == 0 || row == 0 || column + 1 == *width || row + 1 == *height {
+            continue;
+        }
+        let around: Vec<f64> = [-1i64, 0, 1]
+            .iter()
+            .flat_map(|south| [-1i64, 0, 1].map(|east| number as i64 + south * *width as i64 + east))
+            .map(|at| f64::from(heights[at as usize]))
+            .collect();
+        if around.contains(&-9999.0) {
+            continue;
+        }
+        let weighted = |cells: [(usize, f64); 6]| cells.iter().map(|(n, w)| around[*n] * w).sum::<f64>() / 72.0;
+        let east = weighted([(2, 1.0), (5, 2.0), (8, 1.0), (0, -1.0), (3, -2.0), (6, -1.0)]);
+        let north = weighted([(0, 1.0), (1, 2.0), (2, 1.0), (6, -1.0), (7, -2.0), (8, -1.0)]);
+        let slope = east.hypot(north).atan().to_degrees();
+        assert!((f64::from(slopes[number]) - slope).abs() < 1e-4, "cell {number}: {} {slope}", slopes[number]);
+        // The sun is at (-1, 1, sqrt 2) / 2, the normal of the terrain at (-east, -north, 1).
+        let light = (east - north + 2f64.sqrt()) / 2.0 / (1.0 + east * east + north * north).sqrt();
+        let shade = (1.0 + 254.0 * light.max(0.0)).round();
+        assert!((f64::from(shades[number]) - shade).abs() <= 1.0, "cell {number}: {} {shade}", shades[number]);
+        let downhill = (-east).atan2(-north).to_degrees().rem_euclid(360.0);
+        let off = (f64::from(aspects[number]) - downhill).abs();
+        assert!(slope < 1e-3 || off.min(360.0 - off) < 0.1, "cell {number}: {} {downhill}", aspects[number]);
+        inner += 1;
+    }
+    assert!(inner > 10_000, "{inner}");
+    let (_, other) = job(300, "");
+    for file in ["slope.tif", "aspect.tif", "hillshade.tif", "terrain.tif"] {
+        let [a, b] = [&whole, &other].map(|job| fs::read(job.out().join(file)).unwrap());
+        assert!(a == b, "{file}");
+    }
+    let (_, files) = job(1_000, ", cells_per_file = 512");
+    let (of_files, names) = cells_of_files(&files, "slope.vrt", &raster);
+    assert!(of_files == slopes && names.len() > 4 && names[0].contains("slope/000000.tif"), "{names:?}");
+    files.verified();
 }
 
 /// Returns the names and the bytes of all files of a raster, and the list of them.
@@ -376,7 +450,7 @@ fn a_raster_has_any_size_that_a_file_can_have() {
         let job = with_raster(Job::on(&[&cloud]), &format!("resolution = {side:?}"));
         let report = job.report();
         assert_eq!(has_the_heights_of_the_triangles(&job, side), usize::from(is_inside));
-        assert_eq!(warnings(&report).contains("no centre of a cell lies within the terrain"), !is_inside);
+        assert_eq!(warnings(&report).contains("no cell has its centre within the terrain"), !is_inside);
         let image = &raster(&job).images[0];
         assert_eq!((image.width, image.height), (1, 1));
     }

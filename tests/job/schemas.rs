@@ -8,7 +8,9 @@ use tempfile::TempDir;
 
 use crate::bad_files::write;
 use crate::breaklines::with_doubtful_heights;
+use crate::clip::clipped;
 use crate::clouds;
+use crate::diff::surveys;
 use crate::far_points::with_a_far_point;
 use crate::las_file::LasFile;
 use crate::levels::hills;
@@ -91,6 +93,8 @@ fn add_jobs_of_one_part(documents: &Documents) {
     assert!(["bad row", "no point is left of it", "damaged.las"].iter().all(|words| mixed.contains(words)), "{mixed}");
     let (_survey, job) = with_doubtful_heights();
     documents.run(&job);
+    let (_cloud, clipped) = clipped();
+    documents.run(&clipped);
     documents.verify(&job, &[], "proved");
     let (_cloud, far) = with_a_far_point();
     documents.run(&far);
@@ -99,7 +103,10 @@ fn add_jobs_of_one_part(documents: &Documents) {
     // The program believes in a GPU that is a millisecond late.
     let square = clouds::write(folder.path(), "square.csv", &clouds::uniform(6_000, 30_000, 8));
     let job = Job::on(&[&square]).tiles_of(500).threads(2).variable("GDT_GPU", "slow:1");
-    let job = job.with("output", "max_edge = 900.0\nmax_error = 9.0").with("output.raster", "resolution = 500.0");
+    let job = job
+        .with("output", "max_edge = 900.0\nmax_error = 9.0\nexport = [\"obj\", \"ply\"]")
+        .with("output.raster", "resolution = 500.0");
+    let job = job.with("output.contours", "interval = 100");
     documents.run(&job);
     documents.verify(&job, &[&square], "proved");
     add_what_is_missing_or_wrong(documents, &job);
@@ -158,6 +165,8 @@ fn every_document_fits_its_schema_and_every_field_is_in_one() {
     let documents = Documents { folder: tempfile::tempdir().unwrap() };
     add_jobs_of_one_part(&documents);
     add_a_job_of_parts(&documents);
+    let surveys = surveys();
+    documents.add("diff", &surveys.diff(&["--json", "--areas", &surveys.write_areas()]).succeeded().out);
     let project = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut check = Command::new(python);
     check.arg(project.join("tests/python/schemas.py")).arg(project.join("docs/schemas")).arg(documents.folder.path());

@@ -105,8 +105,7 @@ fn what_the_mesh_is_stands_in_the_report_in_check_and_in_info() {
     let [las, ..] = files(folder.path(), &cloud(class));
     let job = |surface: &str| Job::on(&[&las]).with("input", &format!("surface = \"{surface}\""));
     // Nine of ten are no noise, and five of them are ground.
-    let all =
-        "56 % ground: the mesh of all points has vegetation or buildings in it; surface = \"ground\" makes bare earth";
+    let all = "56 % ground: the mesh of all points includes vegetation or buildings; [input] surface = \"ground\" makes bare earth";
     let report = job("all").report();
     assert_eq!(said(&report), all);
     assert!(job("all").run().succeeded().out.contains(all));
@@ -145,7 +144,7 @@ fn a_cloud_without_ground_is_refused_with_what_it_has_and_what_to_do() {
         job.run_with(&["check"]).refused(3, &words);
     }
     let all = Job::on(&[&las]).report();
-    assert!(said(&all).starts_with("0 % ground: the mesh of all points has vegetation"), "{}", said(&all));
+    assert!(said(&all).starts_with("0 % ground: the mesh of all points includes vegetation"), "{}", said(&all));
     // Among files with ground, one without is named.
     let good = folder.path().join("good.las");
     fs::write(&good, cloud(class).las()).unwrap();

@@ -153,7 +153,7 @@ fn units_of_the_names_are_the_units_of_the_mesh() {
     let job = texts.job().with("output", "compression = \"none\"\nlevels = false");
     let report = job.report();
     assert_eq!((report["unit"].as_str(), number(&report["points"]["kept"])), (Some("other"), 50), "{report}");
-    assert!(!warnings(&report).contains("no input says a unit"), "{report}");
+    assert!(!warnings(&report).contains("no input states a known unit"), "{report}");
     assert!(warnings(&report).contains("heights are in another unit than x and y (0.001 m and 0.01 m)"), "{report}");
     let feet = Texts::one(&format!("x;y;z\nft;ft;ft\n{rows}")).job().report();
     assert_eq!(feet["unit"].as_str(), Some("foot"));

@@ -104,7 +104,7 @@ fn without_a_crs_the_units_of_columns_count() {
     for choice in ["none", "first"] {
         let (found, said) = metres(&[&feet], &format!("crs = \"{choice}\""));
         assert_eq!(found, [0.3048, 0.3048]);
-        assert!(!said.contains("no input says"), "{said}");
+        assert!(!said.contains("no input states"), "{said}");
     }
     Job::on(&[&feet, &other])
         .with("input", "crs = \"none\"")
@@ -112,10 +112,10 @@ fn without_a_crs_the_units_of_columns_count() {
         .refused(2, &["feet.csv has x and y in foot", "0.001 m"]);
     let (found, said) = metres(&[&las], "crs = \"none\"");
     assert_eq!(found, [1.0, 1.0]);
-    assert!(said.contains("leaves records of coordinate systems and their units aside"), "{said}");
+    assert!(said.contains("ignores the units that records of coordinate systems state"), "{said}");
     let (found, said) = metres(&[&feet], "[input.csv]\ncolumns = [\"x\", \"y\", \"z\"]");
     assert_eq!(found, [0.3048, 0.3048]);
-    assert!(!said.contains("no input says"), "{said}");
+    assert!(!said.contains("no input states"), "{said}");
 }
 
 #[test]

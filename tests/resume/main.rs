@@ -13,6 +13,7 @@ mod rig;
 mod scattered;
 
 mod changes;
+mod contours;
 mod damaged_tasks;
 mod disk;
 mod earlier_results;

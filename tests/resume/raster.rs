@@ -1,4 +1,4 @@
-//! A job that is stopped while it writes its raster, or goes on with another one.
+//! A job that is stopped while it writes its raster or its mesh for other programs, or goes on with another one.
 
 use crate::rig::{Rig, Setup};
 use crate::scattered;
@@ -12,24 +12,33 @@ fn rig() -> Rig {
 }
 
 #[test]
-fn a_raster_that_was_stopped_anywhere_ends_with_the_same_bytes() {
-    let rig = rig();
-    // While a window is drawn, and while the blocks are put together.
-    for (place, count) in [("window", 1), ("window", 4), ("waiting_blocks", 1), ("waiting_blocks", 5)] {
+fn files_from_the_tiles_that_were_stopped_anywhere_end_with_the_same_bytes() {
+    let exports = with_raster("resolution = 15.0").output("export = [\"landxml\", \"ply\"]");
+    let rig = Rig::new(&scattered::uniform(5_000, 20_000, 5), &exports);
+    // While a window is drawn, while the blocks are put together, while vertices are numbered, and while a mesh is written.
+    for (place, count) in [
+        ("window", 1),
+        ("window", 4),
+        ("waiting_blocks", 1),
+        ("waiting_blocks", 5),
+        ("write_exports", 2),
+        ("chunks", 1),
+        ("chunks", 4),
+    ] {
         rig.forget();
         let what = format!("signal-{place}");
         rig.run_to(&what, count).stopped(&["error: interrupted"]);
         rig.has_nothing_half_written(&what);
         assert!(rig.completes(&what)["resumed"].as_u64() >= Some(5));
     }
-    // The last phases are those of the raster, of what is beside the tiles, and of the report.
+    // The last phases are those of the raster, of the exports, of what is beside the tiles, and of the report.
     rig.forget();
     let mut kills = 0;
     while rig.run_to("committed", 1).was_killed() {
         rig.has_nothing_half_written("a kill after a phase");
         kills += 1;
     }
-    assert!(kills > 4, "{kills} kills");
+    assert!(kills > 5, "{kills} kills");
     rig.is_complete("kills after phases");
 }
 

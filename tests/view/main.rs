@@ -2,7 +2,7 @@
 //! Chromium opens it, clicks, and reads what the page says.
 
 use std::io::{BufRead, BufReader, Write};
-use std::net::TcpStream;
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -101,6 +101,14 @@ impl Terrain {
     /// Opens the page and does the steps. Returns what they gave.
     #[track_caller]
     fn seen(&self, chromium: &Path, steps: &Value) -> Value {
+        let seen = self.opened(chromium, steps, None);
+        assert_eq!(seen["complaints"], json!([]), "the console has errors");
+        seen
+    }
+
+    /// The same. The page may ask `host` too, and the console may have errors.
+    #[track_caller]
+    fn opened(&self, chromium: &Path, steps: &Value, host: Option<&str>) -> Value {
         let server = Server::start(&self.out());
         let path = self.folder.path().join("steps.json");
         std::fs::write(&path, steps.to_string()).unwrap();
@@ -109,10 +117,10 @@ impl Terrain {
         let output = output.expect("node runs");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let seen: Value = serde_json::from_slice(&output.stdout).unwrap();
-        assert_eq!(seen["complaints"], json!([]), "the console has errors");
         let requests = seen["requests"].as_array().unwrap();
         let is_elsewhere = |url: &&Value| {
-            !["data:", "blob:", &server.url].iter().any(|start| url.as_str().unwrap().starts_with(start))
+            let allowed = ["data:", "blob:", &server.url].into_iter().chain(host);
+            !allowed.into_iter().any(|start| url.as_str().unwrap().starts_with(start))
         };
         assert!(!requests.is_empty());
         assert_eq!(requests.iter().find(is_elsewhere), None, "the page asks another host");
@@ -165,6 +173,45 @@ impl Drop for Server {
     }
 }
 
+/// A map service that has blue images for all places up to a level, and none beyond it.
+struct MapService {
+    url: String,
+}
+
+impl MapService {
+    const FINEST_LEVEL: u32 = 15;
+
+    fn start() -> MapService {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let url = format!("http://{}/", listener.local_addr().unwrap());
+        std::thread::spawn(move || listener.incoming().flatten().filter_map(MapService::answer).count());
+        MapService { url }
+    }
+
+    /// Answers one request. What goes wrong with it, such as a browser that has gone, is the browser's matter.
+    fn answer(mut stream: TcpStream) -> Option<()> {
+        let lines = BufReader::new(&stream).lines().map_while(Result::ok).take_while(|line| !line.is_empty());
+        let first = lines.reduce(|first, _| first)?;
+        let level: u32 = first.split('/').nth(1)?.parse().ok()?;
+        let image = if level <= MapService::FINEST_LEVEL { blue_image() } else { Vec::new() };
+        let status = if image.is_empty() { "404 Not Found" } else { "200 OK" };
+        let head = format!(
+            "HTTP/1.1 {status}\r\nContent-Type: image/png\r\nContent-Length: {}\r\n\
+             Access-Control-Allow-Origin: *\r\nConnection: close\r\n\r\n",
+            image.len()
+        );
+        stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(&image)).ok()
+    }
+}
+
+fn blue_image() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 256, 256);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.write_header().unwrap().write_image_data(&[20, 40, 230].repeat(256 * 256)).unwrap();
+    bytes
+}
+
 /// Returns the path of Chromium, or `None` if there is none. Under tests/run that is a failure.
 fn chromium() -> Option<PathBuf> {
     let found = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].map(PathBuf::from).into_iter().find(|p| p.exists());
@@ -204,16 +251,29 @@ fn fact<'a>(seen: &'a Value, term: &str) -> &'a str {
     facts[at + 1].as_str().unwrap()
 }
 
-/// Returns the share of the pixels of a picture that are red, as the points are.
-fn red_share(path: &Path) -> f64 {
+/// Returns the pixels of a picture.
+fn pixels(path: &Path) -> Vec<[u8; 3]> {
     let decoder = png::Decoder::new(BufReader::new(std::fs::File::open(path).unwrap()));
     let mut reader = decoder.read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut bytes).unwrap();
-    let samples = info.color_type.samples();
-    let pixels = bytes[..info.buffer_size()].chunks(samples);
-    let red = pixels.clone().filter(|pixel| pixel[0] > 90 && pixel[0] / 2 > pixel[1].max(pixel[2])).count();
-    red as f64 / pixels.count() as f64
+    let pixels = bytes[..info.buffer_size()].chunks(info.color_type.samples());
+    pixels.map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
+}
+
+/// Returns the share of the pixels of a picture whose `channel` is at least twice as bright as the two others.
+fn share_of(channel: usize, path: &Path) -> f64 {
+    let pixels = pixels(path);
+    let is_strong = |pixel: &&[u8; 3]| {
+        let other = |k: usize| pixel[(channel + k) % 3];
+        pixel[channel] > 90 && pixel[channel] / 2 > other(1).max(other(2))
+    };
+    pixels.iter().filter(is_strong).count() as f64 / pixels.len() as f64
+}
+
+/// Returns the share of the pixels of a picture that are red, as the points are.
+fn red_share(path: &Path) -> f64 {
+    share_of(0, path)
 }
 
 /// Asserts that the page draws the terrain, and that a click tells the coordinates of the source.
@@ -336,6 +396,128 @@ fn walking_ends_with_the_key_whatever_else_is_pressed() {
         assert!(still != turned, "the key does something");
         assert!(turned == after, "it goes on after release {number}");
     }
+}
+
+/// Sets the slider `id`, as a hand does.
+fn slide(id: &str, value: f64) -> String {
+    format!(
+        "{{ const slider = document.getElementById('{id}'); slider.value = {value}; \
+         slider.dispatchEvent(new Event('input', {{bubbles: true}})); }}"
+    )
+}
+
+/// Waits until the address has followed the view.
+fn settled() -> [Value; 2] {
+    [json!({"run": "new Promise((resolve) => setTimeout(resolve, 800))"}), json!({"wait": SHOWN})]
+}
+
+/// Returns how many pixels beside the panel differ between two pictures of a window that is 1280 pixels wide.
+fn differing(one: &Path, other: &Path) -> usize {
+    let pairs = pixels(one).into_iter().zip(pixels(other)).enumerate().filter(|(i, _)| i % 1280 < 950);
+    pairs.filter(|(_, (a, b))| (0..3).any(|k| a[k].abs_diff(b[k]) > 8)).count()
+}
+
+#[test]
+fn exaggerated_heights_are_told_as_they_are_and_a_link_shows_the_same() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("crs = \"EPSG:26910\"", "format = \"3dtiles\"");
+    let wanted = point(20, 33);
+    let shot = |name: &str| terrain.folder.path().join(name);
+    let set =
+        slide("exaggeration", 4.0) + &slide("sun-azimuth", 90.0) + "document.querySelector('[value=height]').click();";
+    // The page goes to the point again: the exaggeration has moved it out of the middle.
+    let go_again =
+        "document.getElementById('point-facts').replaceChildren(); document.querySelector('#go button').click()";
+    let address = "[location.hash, history.length]";
+    let mut steps = steps_to(&terrain, wanted).as_array().unwrap().clone();
+    steps.extend([json!({"run": set}), json!({"run": go_again}), json!({"wait": format!("{FOUND} && {SHOWN}")})]);
+    steps.push(json!({"run": "document.getElementById('point-facts').children[5].textContent"}));
+    steps.extend(settled());
+    steps.push(json!({"run": address, "shot": shot("linked.png")}));
+    steps.push(json!({"run": "window.isOld = true; location.reload()"}));
+    steps.push(json!({"wait": format!("!window.isOld && {SHOWN}")}));
+    steps.extend(settled());
+    steps.push(json!({"run": address, "shot": shot("again.png")}));
+    let seen = terrain.seen(&chromium, &Value::Array(steps));
+    let values = seen["values"].as_array().unwrap().iter().filter(|value| value.is_string() || value[1].is_u64());
+    let [height, linked, again] = values.collect::<Vec<_>>()[..] else { panic!("{seen}") };
+    let height: f64 = height.as_str().unwrap().parse().unwrap();
+    assert!((height - wanted[2] as f64 / 100.0).abs() < 0.05, "{height} is exaggerated");
+    for part in ["view=", "colours=height", "exaggeration=4", "sun=90,45"] {
+        assert!(linked[0].as_str().unwrap().contains(part), "{linked}");
+    }
+    assert_eq!(linked, again);
+    // The ring around the point, and its exact tile, are no part of the view.
+    let [same, other] = [shot("again.png"), terrain.picture()].map(|picture| differing(&shot("linked.png"), &picture));
+    assert!(same < 100_000 && other > 500_000, "{same} pixels differ from the link, {other} from the first view");
+}
+
+#[test]
+fn the_wheel_stops_above_the_ground() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("", "format = \"glb\"");
+    let turn = "document.getElementById('terrain').dispatchEvent(new WheelEvent('wheel', \
+                {deltaY: -400, clientX: 400, clientY: 400, bubbles: true, cancelable: true}))";
+    let wheel = format!(
+        "(async () => {{ for (let i = 0; i < 80; i += 1) {{ {turn}; await new Promise((next) => setTimeout(next, 10)); }} }})()"
+    );
+    // The camera turns around a place far below the ground, and comes nearer to it.
+    let look_down = "location.hash = 'view=0,60,1,0,-300,0'";
+    let mut steps =
+        vec![json!({"size": [1280, 800], "dark": false}), json!({"wait": SHOWN}), json!({"run": look_down})];
+    steps.extend(settled());
+    steps.push(json!({"run": wheel}));
+    steps.extend(settled());
+    steps.push(json!({"shot": terrain.picture()}));
+    terrain.seen(&chromium, &Value::Array(steps));
+    // Below the ground is nothing; the panel takes a quarter of the window.
+    let share = red_share(&terrain.picture());
+    assert!(share > 0.6, "{share} of the picture is terrain");
+}
+
+#[test]
+fn a_tile_that_is_missing_is_named_and_another_one_stands_in_for_it() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("crs = \"EPSG:26910\"", "format = \"3dtiles\"");
+    for tile in std::fs::read_dir(terrain.out().join("tiles")).unwrap() {
+        std::fs::remove_file(tile.unwrap().path()).unwrap();
+    }
+    // A place is exact, or would be: its tile is asked for.
+    let mut steps = steps_to(&terrain, point(20, 33)).as_array().unwrap().clone();
+    let said = "document.getElementById('message').textContent";
+    steps.push(json!({"wait": format!("{said}.includes('cannot be loaded')"), "run": said, "shot": terrain.picture()}));
+    let seen = terrain.opened(&chromium, &Value::Array(steps), None);
+    let said = seen["values"].as_array().unwrap().last().unwrap().as_str().unwrap();
+    assert!(said.contains("tiles/0000") && said.contains("404"), "{said}");
+    let share = red_share(&terrain.picture());
+    assert!(share > 0.3, "{share} of the picture is terrain");
+}
+
+#[test]
+fn images_of_a_map_service_cover_the_terrain_once_the_user_names_it() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("crs = \"EPSG:26910\"", "format = \"3dtiles\"");
+    let service = MapService::start();
+    let name = |template: &str| {
+        format!(
+            "document.getElementById('images-url').value = '{}{template}'; document.querySelector('#images button').click()",
+            service.url
+        )
+    };
+    let steps = json!([
+        {"size": [1280, 800], "dark": false},
+        {"wait": SHOWN},
+        {"run": name("{z}/{x}.png")},
+        {"run": "document.getElementById('images-hint').textContent", "shot": terrain.folder.path().join("without.png")},
+        {"run": name("{z}/{x}/{-y}.png")},
+        {"wait": format!("document.getElementById('attribution').textContent.includes('Images') && {SHOWN}"), "shot": terrain.picture()},
+        {"run": "location.hash"},
+    ]);
+    let seen = terrain.opened(&chromium, &steps, Some(&service.url));
+    assert!(seen["values"][1].as_str().unwrap().contains("{y}"), "a template without y is refused: {seen}");
+    assert!(seen["values"][3].as_str().unwrap().contains("images=http"), "{seen}");
+    let [before, after] = [terrain.folder.path().join("without.png"), terrain.picture()].map(|path| share_of(2, &path));
+    assert!(before < 0.01 && after > 0.2, "{before} and {after} of the picture are blue");
 }
 
 #[test]

@@ -3,6 +3,10 @@ import { BufferAttribute, Mesh, Vector3 } from 'three';
 import { matrixToScene } from './surface.js';
 
 const SAMPLES_PER_MESH = 2000;
+// Slopes are drawn so much steeper, or flatter, that this share of the terrain has less than this slope (rise over run): hills and valleys are
+// seen then. The same rule makes preview.png. The bounds keep trees from going black, and noise from looking like hills.
+const [STEEP_SHARE, TARGET_SLOPE] = [0.7, 0.6];
+const RELIEF_BOUNDS = [0.3, 20];
 
 // Returns for each vertex how far the curve of the earth has moved it up, so that colours stand for heights in the source.
 function liftOf({ attributes: { position } }, toScene, georeference) {
@@ -14,6 +18,18 @@ function liftOf({ attributes: { position } }, toScene, georeference) {
   return new BufferAttribute(lifts, 1);
 }
 
+function meshesOf(scene) {
+  const meshes = [];
+  scene.traverse((object) => { if (object.isMesh) meshes.push(object); });
+  return meshes;
+}
+
+// Returns the value that this share of the values is below.
+function quantile(values, share) {
+  values.sort((a, b) => a - b);
+  return values[Math.floor(share * (values.length - 1))] ?? 0;
+}
+
 export class Dressing {
   constructor(surface) {
     this.surface = surface;
@@ -21,18 +37,22 @@ export class Dressing {
     this.showsEdges = false;
   }
 
-  // Dresses all meshes of a glTF scene. `facts` says what a click on one of them tells of its tile, and `georeference` whether the scene
-  // follows the curve of the earth.
-  add(scene, levelColor, facts, georeference) {
-    const meshes = [];
-    scene.traverse((object) => { if (object.isMesh) meshes.push(object); });
-    for (const mesh of meshes) {
+  // Gives all meshes of a glTF scene their material. `facts` says what a click on one of them tells of its tile, and `georeference` whether the
+  // scene follows the curve of the earth.
+  dress(scene, levelColor, facts, georeference) {
+    for (const mesh of meshesOf(scene)) {
       const toScene = matrixToScene(mesh, scene);
       if (georeference.curvature) mesh.geometry.setAttribute('lift', liftOf(mesh.geometry, toScene, georeference));
       const plain = mesh.material;
       mesh.material = this.surface.material(mesh, toScene, levelColor);
       plain.dispose();
       Object.assign(mesh.userData, { toScene, facts });
+    }
+  }
+
+  // Takes note of the meshes of a scene that can be shown from now on.
+  add(scene) {
+    for (const mesh of meshesOf(scene)) {
       this.meshes.add(mesh);
       this.dressEdges(mesh);
     }
@@ -61,20 +81,52 @@ export class Dressing {
     }
   }
 
+  // Takes the edges off while `act` looks through the meshes.
+  withoutEdges(act) {
+    const shown = [...this.meshes].filter(({ userData }) => userData.edges);
+    shown.forEach((mesh) => mesh.remove(mesh.userData.edges));
+    act();
+    shown.forEach((mesh) => mesh.add(mesh.userData.edges));
+  }
+
   // Returns the heights in metres that all but one in a hundred vertices lie between: a bird or a hole must not take the whole ramp.
   heightRange() {
-    const heights = [];
+    const heights = this.samples().map(({ height }) => height);
+    return [quantile(heights, 0.005), quantile(heights, 0.995)];
+  }
+
+  // Returns some vertices: their heights in metres, and their colours, if they have any, as three linear values.
+  samples() {
+    const samples = [];
     const vertex = new Vector3();
     for (const { geometry, userData } of this.meshes) {
-      const { position, lift } = geometry.attributes;
+      const { position, lift, color } = geometry.attributes;
       const step = Math.max(1, Math.floor(position.count / SAMPLES_PER_MESH));
       for (let i = 0; i < position.count; i += step) {
         const { y } = vertex.fromBufferAttribute(position, i).applyMatrix4(userData.toScene);
-        heights.push(y - (lift?.getX(i) ?? 0));
+        samples.push({ height: y - (lift?.getX(i) ?? 0), color: color && [color.getX(i), color.getY(i), color.getZ(i)] });
       }
     }
-    heights.sort((a, b) => a - b);
-    const at = (share) => heights[Math.floor(share * (heights.length - 1))] ?? 0;
-    return [at(0.005), at(0.995)];
+    return samples;
+  }
+
+  // Returns how much steeper slopes are to be lit than they are.
+  relief() {
+    const slopes = [];
+    const corners = [new Vector3(), new Vector3(), new Vector3()];
+    for (const { geometry: { index, attributes: { position } }, userData } of this.meshes) {
+      const count = (index ?? position).count / 3;
+      const step = Math.max(1, Math.floor(count / SAMPLES_PER_MESH));
+      for (let i = 0; i + 1 <= count; i += step) {
+        corners.forEach((corner, k) => {
+          corner.fromBufferAttribute(position, index ? index.getX(3 * i + k) : 3 * i + k).applyMatrix4(userData.toScene);
+        });
+        const [a, b, c] = corners;
+        const { x, y, z } = b.sub(a).cross(c.sub(a));
+        if (y !== 0) slopes.push(Math.hypot(x, z) / Math.abs(y));
+      }
+    }
+    const [least, most] = RELIEF_BOUNDS;
+    return Math.min(Math.max(TARGET_SLOPE / Math.max(quantile(slopes, STEEP_SHARE), 1e-6), least), most);
   }
 }

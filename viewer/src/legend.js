@@ -1,5 +1,6 @@
 // What the colours mean.
 import { byId, element, length, unitName } from './dom.js';
+import { RAMP } from './point_colors.js';
 import { EXACT_COLOR, HEIGHT_COLORS, LEVEL_COLORS, SLOPE_COLORS, STEEPEST_DEGREES } from './surface.js';
 
 function ramp(title, colors, low, high) {
@@ -10,29 +11,47 @@ function ramp(title, colors, low, high) {
 }
 
 // Returns a height of the scene in the source's unit.
-function heightText(metres, { offset, metres: [, , inUnit] }) {
-  return `${(offset[2] + metres / inUnit).toFixed(1)} ${unitName(inUnit)}`.trim();
+function heightText(metres, { offset, metres: [, , inUnit] }, places = 1) {
+  return `${(offset[2] + metres / inUnit).toFixed(places)} ${unitName(inUnit)}`.trim();
 }
 
-function levelList({ coarser, hasExact }) {
-  const line = (color, text) => {
+const rgb = (bytes) => `rgb(${bytes.join(' ')})`;
+
+// Returns a list of colours and what they stand for.
+function list(title, entries) {
+  const lines = entries.map(([color, text]) => {
     const swatch = element('span');
     swatch.style.background = color;
     return element('li', {}, swatch, text);
-  };
-  const name = (level) => `level ${level}${level === 1 ? ', the coarsest' : ''}`;
-  const lines = coarser.map((level) => line(LEVEL_COLORS[(level - 1) % LEVEL_COLORS.length], name(level)));
-  return [element('div', { textContent: 'Levels of detail' }), element('ul', {}, ...lines, ...(hasExact ? [line(EXACT_COLOR, 'exact, with every point')] : []))];
+  });
+  return [element('div', { textContent: title }), element('ul', {}, ...lines)];
 }
 
-export function showLegend(mode, terrain, [low, high]) {
+function levelList({ coarser, hasExact }) {
+  const name = (level) => `level ${level}${level === 1 ? ', the coarsest' : ''}`;
+  const levels = coarser.map((level) => [LEVEL_COLORS[(level - 1) % LEVEL_COLORS.length], name(level)]);
+  return list('Levels of detail', hasExact ? [...levels, [EXACT_COLOR, 'exact, with every point']] : levels);
+}
+
+// Colours that points were recorded with need no words.
+function pointList({ classes, ramp: heights }, georeference) {
+  if (classes) return list('Classes', classes.map(({ name, color }) => [rgb(color), name]));
+  if (!heights) return [];
+  // The colours tell heights to about a fiftieth of the whole.
+  const places = heights[1] - heights[0] > 20 ? 0 : 1;
+  return ramp('Height, about', RAMP.map(rgb), ...heights.map((height) => heightText(height, georeference, places)));
+}
+
+export function showLegend({ mode, terrain, heights, pointColors, exaggeration }) {
   const { georeference } = terrain;
   const parts = {
-    points: () => [],
-    height: () => ramp('Height', HEIGHT_COLORS, heightText(low, georeference), heightText(high, georeference)),
+    points: () => pointList(pointColors, georeference),
+    height: () => ramp('Height', HEIGHT_COLORS, ...heights.map((height) => heightText(height, georeference))),
     slope: () => ramp('Slope', SLOPE_COLORS, '0°', `${STEEPEST_DEGREES}° and more`),
     levels: () => levelList(terrain.shownLevels),
+    images: () => [],
   }[mode]();
+  if (exaggeration !== 1) parts.push(element('div', { className: 'small', textContent: `Heights × ${exaggeration}` }));
   byId('legend').hidden = parts.length === 0;
   byId('legend').replaceChildren(...parts);
 }

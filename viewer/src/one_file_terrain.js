@@ -8,7 +8,7 @@ export class OneFileTerrain {
     Object.assign(this, { url, loader, dressing, progress });
     this.object = new Group();
     this.attributions = new Set();
-    this.failures = 0;
+    this.failures = [];
     this.isLoading = false;
   }
 
@@ -17,9 +17,13 @@ export class OneFileTerrain {
     const gltf = await this.loader.loadAsync(this.url, ({ loaded, total }) => this.progress(loaded, total));
     this.georeference = new Georeference(gltf.scene.userData, this.url.split('/').pop());
     if (gltf.asset.copyright) this.attributions.add(gltf.asset.copyright);
-    const sphere = new Box3().setFromObject(gltf.scene).getBoundingSphere(new Sphere());
+    const box = new Box3().setFromObject(gltf.scene);
+    const sphere = box.getBoundingSphere(new Sphere());
     this.radius = sphere.radius;
-    this.dressing.add(gltf.scene, EXACT_COLOR, { uri: this.url.split('/').pop(), isExact: true, level: 1, error: 0 }, this.georeference);
+    this.corners = [box.min.x, box.max.x].flatMap((x) => [box.min.y, box.max.y].flatMap((y) => [box.min.z, box.max.z].map((z) => new Vector3(x, y, z))));
+    this.corners.forEach((corner) => corner.sub(sphere.center));
+    this.dressing.dress(gltf.scene, EXACT_COLOR, { uri: this.url.split('/').pop(), isExact: true, level: 1, error: 0 }, this.georeference);
+    this.dressing.add(gltf.scene);
     this.object.position.copy(sphere.center).negate();
     this.object.add(gltf.scene);
     this.object.updateMatrixWorld(true);

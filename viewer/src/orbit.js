@@ -1,14 +1,34 @@
 // Looking at the terrain from outside: the camera turns around a place on it.
 import { MathUtils, MOUSE, TOUCH, Spherical, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { fittingView } from './fit.js';
 
 const TURN = 0.06;
 const ZOOM = 1.15;
+// A turn of the wheel is many events.
+const CENTRE_MS = 200;
 const LOWEST = Math.PI / 2 - 0.02;
+// The whole terrain is seen from the south, from as low as fills the height of the window, in degrees above the horizon; or from between these, if
+// the terrain is too wide for that.
+const [LOWEST_VIEW, USUAL_VIEW, HIGHEST_VIEW] = [42, 57, 69];
+
+function wholeView(corners, camera) {
+  const from = (degrees) => {
+    const angle = MathUtils.degToRad(degrees);
+    const forward = new Vector3(0, -Math.sin(angle), -Math.cos(angle));
+    return { forward, ...fittingView(corners, forward, camera) };
+  };
+  for (let degrees = LOWEST_VIEW; degrees <= HIGHEST_VIEW; degrees += 3) {
+    const view = from(degrees);
+    if (view.isHighest) return view;
+  }
+  return from(USUAL_VIEW);
+}
 
 export class Orbit {
-  constructor(camera, canvas, changed) {
-    Object.assign(this, { camera, changed });
+  // `groundAhead` returns the place of the terrain in the middle of the picture, or null.
+  constructor(camera, canvas, groundAhead, changed) {
+    Object.assign(this, { camera, groundAhead, changed, centred: 0 });
     this.controls = new OrbitControls(camera, canvas);
     Object.assign(this.controls, {
       zoomToCursor: true,
@@ -18,6 +38,7 @@ export class Orbit {
       mouseButtons: { LEFT: MOUSE.ROTATE, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.PAN },
       touches: { ONE: TOUCH.ROTATE, TWO: TOUCH.DOLLY_PAN },
     });
+    this.controls.addEventListener('start', () => this.centre());
     this.controls.addEventListener('change', changed);
   }
 
@@ -29,12 +50,30 @@ export class Orbit {
     return this.controls.target;
   }
 
-  // Shows the whole of a terrain around the origin, from the south and above.
-  showAll(radius) {
-    this.controls.maxDistance = 12 * radius;
-    const upright = Math.tan(MathUtils.degToRad(this.camera.fov / 2));
-    const narrowest = Math.atan(upright * Math.min(1, this.camera.aspect));
-    this.look(new Vector3(), new Vector3(0, 0.68, 0.73).setLength((0.88 * radius) / Math.sin(narrowest)));
+  // Shows the whole of a terrain, which lies within some corners around the origin, as large as the window lets it be.
+  showAll(corners) {
+    const { camera } = this;
+    const { forward, position } = wholeView(corners, camera);
+    const radius = Math.max(...corners.map((corner) => corner.length()));
+    this.controls.maxDistance = Math.max(12 * radius, 2 * position.length());
+    // The camera turns around the place in its middle, at the height of the origin.
+    const target = position.clone().addScaledVector(forward, -position.y / forward.y);
+    this.look(target, position.sub(target));
+  }
+
+  // Turns around, and comes nearer to, what is in the middle: from another place behind it, the wheel would lead through the ground.
+  centre() {
+    const now = performance.now();
+    if (now - this.centred < CENTRE_MS) return;
+    this.centred = now;
+    const place = this.groundAhead();
+    if (place) this.target.copy(place);
+  }
+
+  // Puts the camera at a height, above the ground, and lets it look where it looked.
+  rise(height) {
+    this.camera.position.y = height;
+    this.controls.update();
   }
 
   // Looks at `target` from `offset` beside it.
@@ -69,6 +108,11 @@ export class Orbit {
     this.look(this.target.clone(), offset.setFromSpherical(angles));
   }
 
+  faceNorth() {
+    const { x, y, z } = this.camera.position.clone().sub(this.target);
+    this.look(this.target.clone(), new Vector3(0, y, Math.hypot(x, z)));
+  }
+
   move(right, down) {
     const offset = this.camera.position.clone().sub(this.target);
     const ahead = offset.clone().setY(0).normalize();
@@ -78,6 +122,7 @@ export class Orbit {
   }
 
   zoom(factor) {
+    this.centre();
     const offset = this.camera.position.clone().sub(this.target);
     const distance = Math.min(Math.max(offset.length() * factor, this.controls.minDistance), this.controls.maxDistance);
     this.look(this.target.clone(), offset.setLength(distance));

@@ -3,20 +3,33 @@ import { byId, rows } from './dom.js';
 import { pointFacts } from './legend.js';
 import { describeReport } from './report.js';
 
-const KEYS = {
-  orbit: 'Drag: turn. Right button or two fingers: move. Wheel: nearer. Double click: turn around that place.\n'
-    + 'Keys on the picture: arrows turn, with Shift move, + and − come nearer, Enter takes the point in the middle, Home shows all.',
-  walk: 'Drag: look around. Keys on the picture: arrows or W A S D walk, with Shift faster, Page Up and Down look up and down.',
+// How to move, with a mouse and keys, or with fingers.
+const HINTS = {
+  orbit: {
+    mouse: 'Drag: turn. Right button: move. Wheel: nearer. Double click: turn around that place.\n'
+      + 'Keys on the picture: arrows turn, with Shift move, + and − come nearer, Enter takes the point in the middle, Home shows all.',
+    touch: 'One finger turns. Two fingers move, and come nearer. A tap tells the coordinates.',
+  },
+  walk: {
+    mouse: 'Drag: look around. Keys on the picture: arrows or W A S D walk, with Shift faster, Page Up and Down look up and down.',
+    touch: 'One finger looks around. The buttons on the picture walk.',
+  },
 };
+const hasFingers = matchMedia('(pointer: coarse)');
+
+// Returns the name of a direction in degrees from north to the east.
+const directionName = (degrees) => ['N', 'NE', 'E', 'SE', 'S', 'SW', 'W', 'NW'][Math.round(degrees / 45) % 8];
 
 export class Panel {
-  constructor(viewer, detailPixels) {
+  constructor(viewer, detailPixels, usualDetail) {
     this.viewer = viewer;
     this.tabs = [...byId('tabs').children];
     this.setUpTabs();
     this.setUpView(detailPixels);
+    byId('detail').value = usualDetail;
     this.setUpPoint();
-    byId('keys').textContent = KEYS.orbit;
+    hasFingers.addEventListener('change', () => this.hint());
+    this.hint();
   }
 
   setUpTabs() {
@@ -52,24 +65,66 @@ export class Panel {
     const { viewer } = this;
     const onChange = (id, react) => byId(id).addEventListener('change', ({ target }) => react(target));
     onChange('modes', ({ value }) => { viewer.colors = value; });
-    onChange('shaded', ({ checked }) => { viewer.surface.shared.shaded.value = checked; viewer.changed(); });
-    onChange('edges', ({ checked }) => { viewer.dressing.edges = checked; viewer.changed(); });
-    byId('detail').addEventListener('input', ({ target }) => { viewer.detail = detailPixels[target.value]; });
+    onChange('shaded', ({ checked }) => { viewer.isShaded = checked; });
+    onChange('edges', ({ checked }) => { viewer.edges = checked; });
+    const onInput = (id, react) => byId(id).addEventListener('input', ({ target }) => { react(Number(target.value)); this.reflect(); });
+    onInput('detail', (position) => { viewer.detail = detailPixels[position]; });
+    onInput('exaggeration', (factor) => { viewer.exaggeration = factor; });
+    onInput('sun-azimuth', (degrees) => { viewer.sunAt = [degrees, viewer.sun[1]]; });
+    onInput('sun-altitude', (degrees) => { viewer.sunAt = [viewer.sun[0], degrees]; });
+    byId('images').addEventListener('submit', (event) => {
+      event.preventDefault();
+      this.showImages(byId('images-url').value.trim());
+    });
+    byId('images-off').addEventListener('click', () => this.showImages(''));
     for (const input of document.getElementsByName('move')) input.addEventListener('change', () => this.move(input.value));
     byId('whole').addEventListener('click', () => this.showWhole());
   }
 
+  showImages(template) {
+    try {
+      this.viewer.images = template || null;
+    } catch (error) {
+      this.viewer.imagesError = error.message;
+    }
+    this.reflect();
+  }
+
+  // Shows in the panel what is set.
+  reflect() {
+    const { viewer } = this;
+    const check = (name, value) => { document.querySelector(`input[name="${name}"][value="${value}"]`).checked = true; };
+    byId('mode-images').hidden = !viewer.template;
+    check('mode', viewer.mode);
+    check('move', viewer.movement);
+    byId('shaded').checked = viewer.isShaded;
+    byId('edges').checked = viewer.dressing.showsEdges;
+    byId('exaggeration').value = viewer.exaggeration;
+    byId('exaggeration-value').textContent = `× ${viewer.exaggeration}`;
+    [byId('sun-azimuth').value, byId('sun-altitude').value] = viewer.sun;
+    byId('sun-azimuth-value').textContent = directionName(viewer.sun[0]);
+    byId('sun-altitude-value').textContent = `${viewer.sun[1]}°`;
+    byId('images-field').hidden = !viewer.terrain?.isOnGlobe;
+    if (viewer.template) byId('images-url').value = viewer.template;
+    byId('images-off').hidden = !viewer.template;
+    byId('images-hint').textContent = viewer.imagesError;
+    byId('pad').hidden = viewer.movement !== 'walk';
+    this.hint();
+  }
+
+  hint() {
+    byId('keys').textContent = HINTS[this.viewer.movement][hasFingers.matches ? 'touch' : 'mouse'];
+  }
+
   move(kind) {
     this.viewer.movement = kind;
-    byId('pad').hidden = kind !== 'walk';
-    byId('keys').textContent = KEYS[kind];
-    document.querySelector(`input[name="move"][value="${kind}"]`).checked = true;
+    this.reflect();
     if (kind === 'walk') byId('terrain').focus();
   }
 
   showWhole() {
     this.move('orbit');
-    this.viewer.orbit.showAll(this.viewer.terrain.radius);
+    this.viewer.showAll();
   }
 
   setUpPoint() {
@@ -112,7 +167,7 @@ export class Panel {
     byId('go-hint').textContent = hit ? '' : 'There is no terrain at this place.';
     if (!hit) return;
     this.move('orbit');
-    viewer.orbit.goTo(hit.point, Math.max(20, 0.02 * viewer.terrain.radius));
+    viewer.goTo(hit.point, Math.max(20, 0.02 * viewer.terrain.radius));
     await viewer.pick(hit.point, this);
   }
 
@@ -134,6 +189,7 @@ export class Panel {
   // Before the terrain is there, nothing can be set.
   enable() {
     for (const fields of document.querySelectorAll('fieldset')) fields.disabled = false;
+    this.reflect();
   }
 
   showReport(report) {

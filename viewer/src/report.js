@@ -33,6 +33,17 @@ function leftOut({ points, duplicates, skipped = [] }) {
   return kinds.map(([what, number]) => `${count(number)} ${what}`).join(', ') || 'none';
 }
 
+// With max_error, only some points are vertices, and the others are near the mesh.
+function vertices({ sites, selection }) {
+  return selection ? `${count(sites)} of ${count(selection.points)} points; the others are within ${selection.greatest_error.toPrecision(3)}` : count(sites);
+}
+
+function rasters(raster) {
+  if (!raster) return null;
+  const [columns, lines] = raster.size;
+  return `${raster.products.join(', ')}: ${count(columns)} × ${count(lines)} cells, ${bytes(raster.bytes)}`;
+}
+
 const section = (title, ...children) => element('section', {}, element('h3', { textContent: title }), ...children);
 
 // Returns what the panel shows of a report, or of none.
@@ -45,12 +56,16 @@ export function describeReport(report) {
   const facts = element('dl', {}, ...rows([
     ['points read', count(report.points.read)],
     ['points left out', leftOut(report)],
-    ['vertices', count(report.sites)],
+    ['surface', report.surface],
+    ['vertices', vertices(report)],
     ['triangles', count(report.triangles)],
     ['tiles', count(report.tiles)],
     ['coarser tiles', report.levels?.files ? count(report.levels.files) : null],
     ['source', `${count(report.files)} ${report.files === 1 ? 'file' : 'files'}, unit ${report.unit}`],
     ['CRS', report.crs],
+    ['lattice', report.lattice ? `${report.lattice.resolution} in x and y, ${report.lattice.resolution_z} in z` : null],
+    ['rasters', rasters(report.raster)],
+    ['breaklines', report.breaklines?.features ? `${count(report.breaklines.features)} features` : null],
     ['written', bytes(report.bytes_written)],
   ]));
   const memory = bar(0, report.peak_memory / report.memory_limit, 'share of the limit');

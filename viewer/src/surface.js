@@ -1,8 +1,8 @@
 // How the terrain looks: one shader for all ways of colouring it. Colours and lights are reckoned in the frame of the glTF scene, whose
 // y is the height in the source, wherever on the globe a tile lies. Where a scene follows the curve of the earth, `lift` is taken off.
-import { Color, DoubleSide, Matrix3, Matrix4, ShaderMaterial } from 'three';
+import { Color, DoubleSide, MathUtils, Matrix3, Matrix4, ShaderMaterial, Vector3 } from 'three';
 
-export const MODES = ['points', 'height', 'slope', 'levels'];
+export const MODES = ['points', 'height', 'slope', 'levels', 'images'];
 
 // Ends of the ramps are told apart also by people who see few colours.
 export const HEIGHT_COLORS = ['#30123b', '#3f6fd8', '#1bc8c4', '#7ee04a', '#f3c63a', '#e4572a'];
@@ -12,7 +12,19 @@ export const STEEPEST_DEGREES = 60;
 export const LEVEL_COLORS = ['#e15759', '#f28e2b', '#edc948', '#59a14f', '#4e79a7', '#b07aa1', '#9c755f', '#ff9da7'];
 export const EXACT_COLOR = '#c9d3dc';
 
+// The light on level ground is 1 under the default sun, and comes from three places: the sun, the sky, and two faint lights beside the sun. Those
+// two let slopes in shadow keep their form.
+const [DIRECT, SKY, BESIDE] = [0.62, 0.23, 0.15];
+// A sun that is lower than this leaves level ground darker, as in the evening.
+const LOWEST_FULL_SUN = 0.45;
+
 const linear = (colors) => colors.map((color) => new Color(color));
+
+// Returns the direction to the sun in the scene: x east, y up, z south. Degrees from north to the east, and above the horizon.
+export function sunDirection(azimuth, altitude) {
+  const [turn, rise] = [MathUtils.degToRad(azimuth), MathUtils.degToRad(altitude)];
+  return new Vector3(Math.sin(turn) * Math.cos(rise), Math.sin(rise), -Math.cos(turn) * Math.cos(rise));
+}
 
 const VERTEX = `
 uniform mat4 toScene;
@@ -22,6 +34,9 @@ varying vec3 place;
 varying vec3 upright;
 varying vec3 pointColor;
 uniform vec3 plainColor;
+#ifdef HAS_COLORS
+  attribute vec3 color;
+#endif
 #ifdef IS_BENT
   attribute float lift;
 #endif
@@ -34,8 +49,8 @@ void main() {
   #ifdef HAS_NORMALS
     upright = toSceneNormal * normal;
   #endif
-  #ifdef USE_COLOR
-    pointColor = color.rgb;
+  #ifdef HAS_COLORS
+    pointColor = color;
   #else
     pointColor = plainColor;
   #endif
@@ -45,6 +60,8 @@ void main() {
 const FRAGMENT = `
 uniform int mode;
 uniform bool shaded;
+uniform vec3 sun;
+uniform float relief;
 uniform vec2 heightRange;
 uniform vec3 heightColors[6];
 uniform vec3 slopeColors[6];
@@ -59,21 +76,34 @@ vec3 ramp(vec3 colors[6], float share) {
   for (int i = 1; i < 6; i++) color = mix(color, colors[i], clamp(at - float(i - 1), 0.0, 1.0));
   return color;
 }
+// Returns the light on a surface with this unit normal, whose slopes are made steeper for the eye.
+float lightOn(vec3 up) {
+  vec3 normal = normalize(vec3(relief * up.x, up.y, relief * up.z));
+  vec2 aside = 0.7071 * normalize(vec2(-sun.z, sun.x));
+  float level = max(sun.y, ${LOWEST_FULL_SUN.toFixed(2)});
+  float direct = max(dot(normal, sun), 0.0) / level;
+  float sky = 0.5 + 0.5 * normal.y;
+  float beside = max(dot(normal, vec3(aside.x, 0.7071, aside.y)), 0.0) + max(dot(normal, vec3(-aside.x, 0.7071, -aside.y)), 0.0);
+  return ${DIRECT.toFixed(2)} * direct + ${SKY.toFixed(2)} * sky + ${(BESIDE / Math.SQRT2).toFixed(3)} * beside;
+}
 void main() {
   #ifdef HAS_NORMALS
     vec3 up = normalize(upright);
   #else
     vec3 up = normalize(cross(dFdx(place), dFdy(place)));
-    if (up.y < 0.0) up = -up;
   #endif
+  if (up.y < 0.0) up = -up;
   vec3 color = pointColor;
   if (mode == 1) color = ramp(heightColors, (height - heightRange.x) / max(heightRange.y - heightRange.x, 1e-6));
   if (mode == 2) color = ramp(slopeColors, degrees(acos(clamp(up.y, 0.0, 1.0))) / ${STEEPEST_DEGREES.toFixed(1)});
   if (mode == 3) color = levelColor;
-  // The sun is in the north-west, as on maps.
-  float light = dot(up, normalize(vec3(-0.6, 0.9, -0.6)));
-  if (shaded) color *= 0.42 + 0.12 * up.y + 0.62 * max(light, 0.0);
-  gl_FragColor = vec4(color, 1.0);
+  vec4 diffuseColor = vec4(color, 1.0);
+  // The plug-in for images puts them in here.
+  #include <color_fragment>
+  if (mode != 4) diffuseColor.rgb = color;
+  // The eye sees ratios of light in encoded colours, as in preview.png: hence the power.
+  if (shaded) diffuseColor.rgb *= pow(lightOn(up), 2.2);
+  gl_FragColor = vec4(diffuseColor.rgb, 1.0);
   #include <colorspace_fragment>
 }`;
 
@@ -87,6 +117,8 @@ export class Surface {
     this.shared = {
       mode: { value: 0 },
       shaded: { value: true },
+      sun: { value: sunDirection(315, 45) },
+      relief: { value: 1 },
       heightRange: { value: [0, 1] },
       heightColors: { value: linear(HEIGHT_COLORS) },
       slopeColors: { value: linear(SLOPE_COLORS) },
@@ -112,10 +144,9 @@ export class Surface {
         plainColor: { value: mesh.material.color.clone() },
         levelColor: { value: new Color(levelColor) },
       },
-      defines: { ...(normal && { HAS_NORMALS: '' }), ...(lift && { IS_BENT: '' }) },
+      defines: { ...(normal && { HAS_NORMALS: '' }), ...(color && { HAS_COLORS: '' }), ...(lift && { IS_BENT: '' }) },
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
-      vertexColors: Boolean(color),
       side: DoubleSide,
       // So that edges lie in front of their own triangles.
       polygonOffset: true,

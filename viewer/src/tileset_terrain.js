@@ -1,8 +1,9 @@
 // A terrain in 3D Tiles: loads the tiles that the view needs, and puts them into a frame whose x is east, y up and z south.
-import { Matrix4, Ray, Sphere, Vector3 } from 'three';
+import { Box3, Matrix4, Ray, Sphere, Vector3 } from 'three';
 import { TilesRenderer, WGS84_ELLIPSOID } from '3d-tiles-renderer';
 import { LoadRegionPlugin, RayRegion } from '3d-tiles-renderer/plugins';
 import { Georeference } from './georeference.js';
+import { Images } from './images.js';
 import { EXACT_COLOR, LEVEL_COLORS } from './surface.js';
 
 const CACHE_BYTES = 700e6;
@@ -19,10 +20,15 @@ const SINGLE_SLASHES = {
   },
 };
 
+// Returns the name of a tile as the folder of results has it.
+const nameOf = (tile) => tile.content.uri.replace(/^(\.\.\/)+/, '');
+
+const isOnGlobe = (place) => place.length() > LEAST_EARTH_RADIUS;
+
 // Returns the frame at a place of a tileset that is Z up: its origin there, x east, y up, z south.
 function localFrame(place) {
   const eastNorthUp = new Matrix4().makeTranslation(place);
-  if (place.length() > LEAST_EARTH_RADIUS) {
+  if (isOnGlobe(place)) {
     const { lat, lon, height } = WGS84_ELLIPSOID.getPositionToCartographic(place, {});
     WGS84_ELLIPSOID.getEastNorthUpFrame(lat, lon, height, eastNorthUp);
   }
@@ -31,7 +37,7 @@ function localFrame(place) {
 
 export class TilesetTerrain {
   // `loader` reads GLBs, `dressing` gives meshes their look, and `changed` is called when there is something new to draw.
-  constructor(url, { loader, dressing, camera, renderer, changed }) {
+  constructor(url, { loader, dressing, camera, renderer, changed, imagesFailed }) {
     Object.assign(this, { camera, renderer, dressing, changed });
     this.tiles = new TilesRenderer(url);
     this.tiles.manager.addHandler(/\.glb$/i, loader);
@@ -42,7 +48,10 @@ export class TilesetTerrain {
     this.tiles.registerPlugin(this.exactPlaces);
     this.object = this.tiles.group;
     this.attributions = new Set();
-    this.failures = 0;
+    this.failures = [];
+    this.images = new Images(this.tiles, dressing, imagesFailed);
+    // Meshes get their material before the plug-in for images sees them.
+    this.tiles.registerPlugin({ name: 'DRESSING', priority: -20, processTileModel: (scene, tile) => this.dress(scene, tile) });
     this.tiles.addEventListener('load-model', ({ scene, tile }) => this.add(scene, tile));
     this.tiles.addEventListener('dispose-model', ({ scene }) => dressing.remove(scene));
     for (const event of ['needs-update', 'tile-visibility-change', 'tiles-load-end']) {
@@ -54,8 +63,9 @@ export class TilesetTerrain {
   async open() {
     await new Promise((resolve, reject) => {
       this.tiles.addEventListener('load-root-tileset', resolve);
-      this.tiles.addEventListener('load-error', ({ tile, error }) => {
-        if (tile) this.failures += 1;
+      this.tiles.addEventListener('load-error', ({ tile, error, overlay }) => {
+        if (overlay) return;
+        if (tile) this.miss(tile, error);
         else reject(error);
       });
       this.tiles.update();
@@ -66,19 +76,43 @@ export class TilesetTerrain {
     const sphere = new Sphere();
     this.tiles.getBoundingSphere(sphere);
     this.radius = sphere.radius;
+    this.isOnGlobe = isOnGlobe(sphere.center);
     localFrame(sphere.center).invert().decompose(this.object.position, this.object.quaternion, this.object.scale);
     this.object.updateMatrixWorld(true);
+    this.corners = this.boxCorners();
   }
 
-  add(scene, tile) {
+  // Returns the corners of the box around the terrain, in its frame.
+  boxCorners() {
+    const [box, toTileset] = [new Box3(), new Matrix4()];
+    this.tiles.getOrientedBoundingBox(box, toTileset);
+    const { min, max } = box;
+    const corners = [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new Vector3(x, y, z))));
+    return corners.map((corner) => corner.applyMatrix4(toTileset).applyMatrix4(this.object.matrixWorld));
+  }
+
+  // A tile cannot be loaded: others stand in for it. Those are the finer ones below it, which the renderer always goes on to from a tile that is no
+  // finer than the one above; or else the coarser one above, which it takes for fine enough if that has no error.
+  miss(tile, error) {
+    this.failures.push({ name: nameOf(tile), status: /\d{3}$/.exec(error?.message)?.[0] ?? null });
+    if (tile.children.length > 0) tile.geometricError = tile.parent?.geometricError ?? tile.geometricError;
+    else if (tile.parent?.internal.hasRenderableContent) tile.parent.geometricError = 0;
+    this.changed();
+  }
+
+  dress(scene, tile) {
     const isExact = tile.children.length === 0;
     const level = tile.internal.depthFromRenderedParent;
     const color = isExact ? EXACT_COLOR : LEVEL_COLORS[(level - 1) % LEVEL_COLORS.length];
     const error = tile.extras?.maxError ?? 0;
-    const facts = { uri: tile.content.uri.replace(/^(\.\.\/)+/, ''), isExact, level, error };
+    const facts = { uri: nameOf(tile), isExact, level, error };
+    this.dressing.dress(scene, color, facts, this.georeference);
+  }
+
+  add(scene, tile) {
     const { copyright } = tile.engineData.metadata?.asset ?? {};
     if (copyright) this.attributions.add(copyright);
-    this.dressing.add(scene, color, facts, this.georeference);
+    this.dressing.add(scene);
   }
 
   // The levels of the coarser tiles on the screen, and whether there are exact ones.
@@ -98,7 +132,7 @@ export class TilesetTerrain {
   }
 
   get isLoading() {
-    return this.tiles.isLoading || this.tiles.loadProgress < 1;
+    return this.tiles.isLoading || this.tiles.loadProgress < 1 || this.images.isLoading;
   }
 
   // Loads the exact tiles that a ray in the frame of the terrain passes, and keeps them until the function is called that this returns.

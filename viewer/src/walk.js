@@ -9,6 +9,8 @@ const TURN_PER_PIXEL = 0.004;
 const STEEPEST_LOOK = 1.4;
 // The terrain may jump, from the ground onto a tree; the eye follows within about this time.
 const RISE_SECONDS = 0.15;
+// But not nearer to the ground than this share of its height above it.
+const LEAST_SHARE = 0.5;
 
 // What keys do: steps ahead and to the right, turns to the right and up.
 const KEYS = {
@@ -42,6 +44,15 @@ export class Walk {
     this.isOn = true;
     this.camera.position.copy(place);
     this.stand(1);
+    this.changed();
+  }
+
+  // Goes on from where somebody stood, who looked at `target`.
+  startAt(position, target) {
+    const way = target.clone().sub(position);
+    this.heading = Math.atan2(way.x, -way.z);
+    this.tilt = Math.atan2(way.y, Math.hypot(way.x, way.z));
+    this.camera.position.copy(position);
     this.changed();
   }
 
@@ -94,6 +105,10 @@ export class Walk {
     this.changed();
   }
 
+  faceNorth() {
+    this.look(-this.heading, 0);
+  }
+
   // Goes on for some seconds. Returns whether the eye is still on its way.
   update(seconds) {
     const [ahead, right, turn, up] = [0, 1, 2, 3].map((i) => [...this.pressed.values()].reduce((sum, way) => sum + way[i], 0));
@@ -114,7 +129,7 @@ export class Walk {
     const ground = this.groundBelow(this.camera.position);
     if (ground === null) return 0;
     const way = ground + EYE_METRES - this.camera.position.y;
-    this.camera.position.y += way * share;
-    return Math.abs(way * (1 - share));
+    this.camera.position.y = Math.max(this.camera.position.y + way * share, ground + LEAST_SHARE * EYE_METRES);
+    return Math.abs(ground + EYE_METRES - this.camera.position.y);
   }
 }

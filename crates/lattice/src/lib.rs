@@ -2,12 +2,15 @@
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
+mod area;
+mod polygon_text;
 mod vertex_digest;
 
+pub use area::{FARTHEST_VERTEX, LatticeArea, Polygons};
 pub use vertex_digest::VertexDigest;
 
-use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
+use rust_decimal::{Decimal, RoundingStrategy};
 use serde::{Deserialize, Serialize};
 
 /// The raw integer of a coordinate that no other raw integer can hold. It lies outside every lattice.
@@ -55,13 +58,26 @@ impl Lattice {
 
     /// Returns the lattice integer of a world coordinate that is written as [`Lattice::world_text`] does; `None` if it is none of the lattice.
     pub fn integer_of_text(&self, axis: usize, text: &str) -> Option<i32> {
-        let world = Decimal::from_str_exact(text).ok()?;
-        let steps = world.checked_sub(self.offset[axis])?.checked_div(self.step(axis))?;
-        steps.is_integer().then(|| steps.to_i32()).flatten()
+        self.wide_integer_of_text(axis, text).and_then(|integer| i32::try_from(integer).ok())
     }
 
-    fn exact_world(&self, axis: usize, i: i32) -> Option<Decimal> {
-        self.step(axis).checked_mul(Decimal::from(i))?.checked_add(self.offset[axis])
+    fn wide_integer_of_text(&self, axis: usize, text: &str) -> Option<i64> {
+        let world = Decimal::from_str_exact(text).ok()?;
+        let steps = world.checked_sub(self.offset[axis])?.checked_div(self.step(axis))?;
+        steps.is_integer().then(|| steps.to_i64()).flatten()
+    }
+
+    /// Returns the lattice integer nearest to a world coordinate on `axis`, halves away from zero; `None` if it lies farther than
+    /// [`FARTHEST_VERTEX`] from zero, is no number, or has no exact world coordinate.
+    pub fn nearest(&self, axis: usize, value: f64) -> Option<i64> {
+        let steps = shortest_decimal(value)?.checked_sub(self.offset[axis])?.checked_div(self.step(axis))?;
+        let whole = steps.round_dp_with_strategy(0, RoundingStrategy::MidpointAwayFromZero).to_i64()?;
+        let is_near = (-FARTHEST_VERTEX..=FARTHEST_VERTEX).contains(&whole);
+        (is_near && self.exact_world(axis, whole).is_some()).then_some(whole)
+    }
+
+    fn exact_world(&self, axis: usize, i: impl Into<Decimal>) -> Option<Decimal> {
+        self.step(axis).checked_mul(i.into())?.checked_add(self.offset[axis])
     }
 }
 

@@ -46,6 +46,12 @@ pub struct InputOptions {
     /// Keep only the points within this rectangle, in the system of the job: with `to_crs`, in that.
     #[serde(default)]
     pub bounds: Option<SourceBounds>,
+    /// Keep only the points within the polygons of this file: its path, relative to the configuration file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clip: Option<String>,
+    /// The box of these polygons in source units, once the job knows it: [xmin, ymin, xmax, ymax].
+    #[serde(skip)]
+    pub clip_box: Option<[f64; 4]>,
     /// Keep only the points between these heights, in the unit of the files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heights: Option<KeptHeights>,
@@ -152,7 +158,17 @@ impl InputOptions {
 
     /// Returns whether the options leave out points of some place, class or return. Noise does not count.
     pub fn has_filter(&self) -> bool {
-        self.bounds.is_some() || self.chooses_kinds()
+        self.bounds.is_some() || self.clip.is_some() || self.chooses_kinds()
+    }
+
+    /// Returns the rectangle that `bounds` and the box of `clip` share, [xmin, ymin, xmax, ymax]; inside out if they are apart. Outside of
+    /// it no point is wanted.
+    pub fn rectangle(&self) -> Option<[f64; 4]> {
+        let bounds = self.bounds.map(|bounds| bounds.0);
+        match (bounds, self.clip_box) {
+            (Some(a), Some(b)) => Some([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]),
+            _ => bounds.or(self.clip_box),
+        }
     }
 
     /// Returns whether the options leave out points of some class or return. Noise does not count.
@@ -197,7 +213,7 @@ impl InputOptions {
             returns: self.kept_returns(),
             heights: self.heights,
             nodata: self.nodata.clone(),
-            use_index: self.bounds.is_some(),
+            use_index: self.bounds.is_some() || self.clip.is_some(),
             fields,
         }
     }

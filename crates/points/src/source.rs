@@ -117,6 +117,9 @@ pub struct Source {
     /// Where the points of a binary file lie, if they had to be looked at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     measured: Option<Box<MeasuredPoints>>,
+    /// Whether no point of the file is wanted, by its header, so that none is read.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    is_left_aside: bool,
     points: PointData,
 }
 
@@ -241,6 +244,7 @@ fn open_las(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
         nodata: Vec::new(),
         kept_heights: None,
         measured: None,
+        is_left_aside: false,
         points,
     };
     source.drop_false_geocentric_crs(choice.is_crs_stated)?;
@@ -281,6 +285,7 @@ fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice)
         nodata: Vec::new(),
         kept_heights: None,
         measured: None,
+        is_left_aside: false,
         points: PointData::Text(Box::new(table)),
     })
 }
@@ -307,8 +312,20 @@ impl Source {
     pub fn known_malformed(&self) -> u64 {
         match &self.points {
             PointData::Text(table) => table.malformed() + table.missing,
+            _ if self.is_left_aside => 0,
             _ => self.missing + self.outliers(),
         }
+    }
+
+    /// Has no point of the file read: from now on it has no chunks. Its records still count.
+    pub fn leave_aside(&mut self) {
+        self.is_left_aside = true;
+    }
+
+    /// Returns what became of all records of a file that is left aside; `None` for any other file.
+    pub fn counts_left_aside(&self) -> Option<PointCounts> {
+        let (read, out_of_bounds, not_decoded) = (self.records, self.records, self.records);
+        self.is_left_aside.then(|| PointCounts { read, out_of_bounds, not_decoded, ..PointCounts::default() })
     }
 
     /// Leaves out the rows of a text that lie so far from all others that they are mistakes, if they are few: decoding counts them as
@@ -412,6 +429,11 @@ impl Source {
         (!compares_itself).then(|| RawBounds::of(&self.axes, bounds))
     }
 
+    /// Returns the raw integers within a rectangle, as [`Source::raw_bounds`] does, but of a text too: to whose own bounds they come on top.
+    pub fn raw_rectangle(&self, rectangle: [f64; 4]) -> RawBounds {
+        RawBounds::of(&self.axes, rectangle)
+    }
+
     /// Returns the number of points that are left out as outliers.
     pub fn outliers(&self) -> u64 {
         match &self.points {
@@ -448,7 +470,7 @@ impl Source {
     ///
     /// For LAZ, a chunk of the source is one chunk of the file, or a run of several if those are small.
     pub fn chunks(&self) -> usize {
-        self.points.chunk_count()
+        if self.is_left_aside { 0 } else { self.points.chunk_count() }
     }
 
     /// Decodes chunk `chunk` (below [`Source::chunks`]) and hands the points that pass `rules` to `sink` in record order, at
@@ -519,7 +541,8 @@ impl Source {
     pub fn decoded_chunks(&self, bounds: Option<&RawBounds>) -> DecodedChunks {
         let bounds = self.own_bounds(bounds);
         if bounds.is_none() || !self.has_index() {
-            return DecodedChunks::all(self.chunks(), self.records - self.missing);
+            let records = if self.is_left_aside { 0 } else { self.records - self.missing };
+            return DecodedChunks::all(self.chunks(), records);
         }
         let records = |chunk: usize| self.points.decoded_records(chunk, bounds).unwrap_or(0);
         DecodedChunks::listed((0..self.chunks()).map(records))

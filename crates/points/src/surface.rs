@@ -122,22 +122,22 @@ impl SurfaceShares {
         }
         if unclassified == points {
             return Some(
-                "the points are not classified: the mesh may have vegetation and buildings in it; surface = \"bare-earth\" finds the ground"
+                "points are unclassified: the mesh includes any vegetation and buildings; [input] surface = \"bare-earth\" finds the ground"
                     .into(),
             );
         }
         let what = match mesh {
             MeshOf::Surface(Surface::All | Surface::Ground | Surface::BareEarth) => {
-                "the mesh of all points has vegetation or buildings in it"
+                "the mesh of all points includes vegetation or buildings"
             }
-            MeshOf::Surface(Surface::First) => "the mesh of first returns has roofs and tree tops in it",
-            MeshOf::Surface(Surface::Last) => "the mesh of last returns has buildings and dense vegetation in it",
+            MeshOf::Surface(Surface::First) => "the mesh of first returns includes roofs and tree tops",
+            MeshOf::Surface(Surface::Last) => "the mesh of last returns includes buildings and dense vegetation",
             MeshOf::Chosen => "the mesh is that of the classes and returns that [input] chooses",
         };
         let remedy = match mesh {
             MeshOf::Chosen => "",
-            _ if ground > 0 => "; surface = \"ground\" makes bare earth",
-            _ => "; surface = \"bare-earth\" finds the ground",
+            _ if ground > 0 => "; [input] surface = \"ground\" makes bare earth",
+            _ => "; [input] surface = \"bare-earth\" finds the ground",
         };
         Some(format!("{} ground: {what}{remedy}", percent(ground, points)))
     }
@@ -201,9 +201,11 @@ mod tests {
             |classes: &[(u8, u64)], surface| shares(classes).sentence(MeshOf::Surface(surface)).unwrap_or_default();
         assert_eq!(
             say(&[(2, 60), (9, 2), (5, 38), (7, 1000)], Surface::All),
-            "62 % ground: the mesh of all points has vegetation or buildings in it; surface = \"ground\" makes bare earth"
+            "62 % ground: the mesh of all points includes vegetation or buildings; [input] surface = \"ground\" makes bare earth"
         );
-        assert!(say(&[(2, 1), (6, 2)], Surface::First).contains("33 % ground: the mesh of first returns has roofs"));
+        assert!(
+            say(&[(2, 1), (6, 2)], Surface::First).contains("33 % ground: the mesh of first returns includes roofs")
+        );
         assert!(say(&[(2, 1), (6, 2)], Surface::Last).contains("last returns"));
         assert_eq!(say(&[(2, 7), (8, 1), (9, 1), (20, 1)], Surface::Ground), "100 % ground: the mesh is bare earth");
         assert!(say(&[(0, 3), (1, 4)], Surface::All).contains("surface = \"bare-earth\" finds the ground"));

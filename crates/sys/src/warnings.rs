@@ -1,9 +1,28 @@
 //! Warnings: what a user should know although the job goes on.
 
+use crate::terminal::one_line;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::path::Path;
 
-/// Warnings in the order in which they were found. Each is a full sentence without a final full stop.
+/// What stands between a warning and its remedy.
+const FIX: &str = "; fix: ";
+
+/// A warning as people see it: a line with what it is, and another with what to do about it, if it has a remedy.
+#[derive(Clone, Copy, Debug)]
+pub struct ShownWarning<'a>(pub &'a str);
+
+impl fmt::Display for ShownWarning<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0.rsplit_once(FIX) {
+            Some((what, fix)) => write!(f, "warning: {}\n  fix: {}", one_line(what), one_line(fix)),
+            None => write!(f, "warning: {}", one_line(self.0)),
+        }
+    }
+}
+
+/// Warnings in the order in which they were found. Each is a full sentence without a final full stop, and may go on with `; fix: ` and what
+/// to do.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Warnings(Vec<String>);
@@ -56,5 +75,16 @@ impl IntoIterator for Warnings {
 
     fn into_iter(self) -> Self::IntoIter {
         self.0.into_iter()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_remedy_has_a_line_of_its_own() {
+        assert_eq!(ShownWarning("unit unknown; fix: set\nit").to_string(), "warning: unit unknown\n  fix: set\\nit");
+        assert_eq!(ShownWarning("rounded").to_string(), "warning: rounded");
     }
 }

@@ -4,6 +4,8 @@
 //! ones most of all. File n below 256 is in the folder of its kind. From 256 on it is in the folder `n / 256` there, from 65,536 on
 //! in a folder above that, and so on. A folder has the number of its first file divided by 256, so no two have the same name.
 
+use crate::options::ExportFormat;
+use crate::raster::products::{PRODUCTS, RasterProduct};
 use std::path::{Path, PathBuf};
 
 const TILES: &str = "tiles";
@@ -11,7 +13,6 @@ const LEVELS: &str = "levels";
 const CUT: &str = "cut";
 const TILESETS: &str = "tilesets";
 const GLB: &str = "glb";
-const RASTER: &str = "raster";
 const JSON: &str = "json";
 const TIF: &str = "tif";
 const CLASSIFIED: &str = "classified";
@@ -82,9 +83,10 @@ impl OutputFiles {
     }
 
     /// Returns the folders that hold numbered files, each with the ending of their names.
-    pub fn numbered_folders(&self) -> [(PathBuf, &'static str); 5] {
-        let rasters = (self.directory.join(RASTER), TIF);
-        [(self.tiles(), GLB), (self.levels(), GLB), (self.cut(), GLB), (self.tilesets(), JSON), rasters]
+    pub fn numbered_folders(&self) -> Vec<(PathBuf, &'static str)> {
+        let own = [(self.tiles(), GLB), (self.levels(), GLB), (self.cut(), GLB), (self.tilesets(), JSON)];
+        let rasters = PRODUCTS.map(|product| (self.directory.join(product.names()[1]), TIF));
+        own.into_iter().chain(rasters).collect()
     }
 
     /// Returns the folder of the inputs with the classes that the job has found, and the ending of their names.
@@ -132,19 +134,29 @@ impl OutputFiles {
         self.directory.join("preview.pgw")
     }
 
-    /// Returns the raster of heights.
-    pub fn raster(&self) -> PathBuf {
-        self.directory.join("terrain.tif")
+    /// Returns the raster of heights, or of what follows from them.
+    pub fn raster(&self, product: RasterProduct) -> PathBuf {
+        self.directory.join(format!("{}.{TIF}", product.names()[0]))
     }
 
-    /// Returns file number `number` of a raster in several files.
-    pub fn raster_file(&self, number: usize) -> PathBuf {
-        self.directory.join(raster_uri(number))
+    /// Returns the list of the files of a raster in several files, which programs open as one.
+    pub fn raster_list(&self, product: RasterProduct) -> PathBuf {
+        self.directory.join(format!("{}.vrt", product.names()[0]))
     }
 
-    /// Returns the list of the files of such a raster, which programs open as one.
-    pub fn raster_list(&self) -> PathBuf {
-        self.directory.join("terrain.vrt")
+    /// Returns the contour lines for CAD programs.
+    pub fn contour_drawing(&self) -> PathBuf {
+        self.directory.join("contours.dxf")
+    }
+
+    /// Returns the mesh in a format of other programs.
+    pub fn export(&self, format: ExportFormat) -> PathBuf {
+        self.directory.join(format.file_name())
+    }
+
+    /// Returns the contour lines.
+    pub fn contours(&self) -> PathBuf {
+        self.directory.join("contours.gpkg")
     }
 
     /// Returns the page that shows the terrain in a browser.
@@ -174,8 +186,8 @@ pub fn level_uri(node: usize) -> String {
 }
 
 /// Returns the path of file number `number` of a raster in several files from the output directory.
-pub fn raster_uri(number: usize) -> String {
-    numbered(RASTER, number, TIF)
+pub fn raster_uri(product: RasterProduct, number: usize) -> String {
+    numbered(product.names()[1], number, TIF)
 }
 
 /// Returns the path of an external tileset from the output directory, or that of the main tileset.

@@ -1,4 +1,4 @@
-//! Writes the terrain: glTF tiles, one scene of all tiles, 3D Tiles, the georeference, a raster of heights and a picture.
+//! Writes the terrain: glTF tiles, one scene of all tiles, 3D Tiles, the georeference, a raster of heights, contour lines and a picture.
 //!
 //! [`frame::Frame`] says where a lattice point lies in a glTF scene. All code that writes or reads positions asks it.
 
@@ -10,9 +10,11 @@ pub mod breakline_list;
 pub mod checksums;
 pub mod color;
 pub mod compression;
+pub mod contour_options;
 pub mod curvature;
 pub mod file_names;
 pub mod frame;
+pub mod geopackage;
 pub mod gltf;
 pub mod lod;
 pub mod normals;

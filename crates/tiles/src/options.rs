@@ -2,11 +2,13 @@
 
 use crate::attributes::AttributeChoice;
 use crate::compression::{Compression, CompressionChoice};
+use crate::contour_options::ContourOptions;
 use crate::page::{NOT_BUILT_IN, is_built_in};
 use crate::raster::options::RasterOptions;
 use crs::geoid::option::HeightOffset;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// `[output]`: where the results go, and what they are.
@@ -52,6 +54,9 @@ pub struct OutputOptions {
     /// Whether slivers along the hull are left out.
     #[serde(default)]
     pub hull: Hull,
+    /// The formats of other programs that the mesh is written in too.
+    #[serde(default, skip_serializing_if = "ExportChoice::is_empty")]
+    pub export: ExportChoice,
     /// Whose the data are: viewers show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub copyright: Option<Copyright>,
@@ -61,6 +66,9 @@ pub struct OutputOptions {
     /// The raster of heights, if there is to be one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub raster: Option<RasterOptions>,
+    /// The contour lines, if there are to be some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contours: Option<ContourOptions>,
 }
 
 impl OutputOptions {
@@ -146,6 +154,82 @@ pub enum OutputFormat {
     /// 3D Tiles, `tileset.json`.
     #[serde(rename = "3dtiles", alias = "tiles")]
     Tiles3d,
+}
+
+/// A format of other programs that the exact mesh can be written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ExportFormat {
+    /// LandXML 1.2.
+    Landxml,
+    /// DXF.
+    Dxf,
+    /// Wavefront OBJ.
+    Obj,
+    /// PLY.
+    Ply,
+}
+
+impl ExportFormat {
+    /// All formats, in the order in which they are written.
+    pub const ALL: [ExportFormat; 4] = [ExportFormat::Landxml, ExportFormat::Dxf, ExportFormat::Obj, ExportFormat::Ply];
+
+    /// Returns the word for the format.
+    pub fn name(self) -> &'static str {
+        match self {
+            ExportFormat::Landxml => "landxml",
+            ExportFormat::Dxf => "dxf",
+            ExportFormat::Obj => "obj",
+            ExportFormat::Ply => "ply",
+        }
+    }
+
+    /// Returns the name of the file.
+    pub fn file_name(self) -> &'static str {
+        match self {
+            ExportFormat::Landxml => "terrain.xml",
+            ExportFormat::Dxf => "terrain.dxf",
+            ExportFormat::Obj => "terrain.obj",
+            ExportFormat::Ply => "terrain.ply",
+        }
+    }
+}
+
+/// The formats of other programs that the mesh is written in. Their order does not matter.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<String>", into = "Vec<String>")]
+pub struct ExportChoice(BTreeSet<ExportFormat>);
+
+impl ExportChoice {
+    /// Tells whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Returns the formats in their order.
+    pub fn formats(&self) -> impl Iterator<Item = ExportFormat> {
+        self.0.iter().copied()
+    }
+}
+
+impl TryFrom<Vec<String>> for ExportChoice {
+    type Error = String;
+
+    fn try_from(names: Vec<String>) -> std::result::Result<ExportChoice, String> {
+        let format = |name: String| {
+            let known = ExportFormat::ALL.into_iter().find(|format| format.name() == name);
+            known.ok_or_else(|| {
+                let all = ExportFormat::ALL.map(|format| format!("\"{}\"", format.name()));
+                format!("export is a list of formats: {}; {name:?} is not known", all.join(", "))
+            })
+        };
+        names.into_iter().map(format).collect::<std::result::Result<_, _>>().map(ExportChoice)
+    }
+}
+
+impl From<ExportChoice> for Vec<String> {
+    fn from(choice: ExportChoice) -> Vec<String> {
+        choice.formats().map(|format| format.name().to_owned()).collect()
+    }
 }
 
 /// Where vertex colours come from.

@@ -8,11 +8,11 @@ use crate::border::{BorderEdge, BorderSite, MeshBorder};
 use crate::exact::{EdgeState, edge_state};
 use crate::failures::{Failure, Failures};
 use crate::keyed_records::KeyedRecords;
-use crate::source_grid::SourceGrid;
 use crate::tile_files::TileFiles;
 use delaunay::geometry::Site;
 use lattice::VertexDigest;
 use sys::Result;
+use terrain::SourceGrid;
 
 /// The borders of all meshes that have been checked so far.
 pub(super) struct Borders {

@@ -12,10 +12,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::failures::Failure;
 use crate::findings::Findings;
-use crate::source_grid::SourceGrid;
 use delaunay::geometry::Site;
 use lattice::Lattice;
 use sys::{Error, Result};
+use terrain::SourceGrid;
 use tiles::breakline_list::{HEADER, ends_of};
 use tiles::file_names::OutputFiles;
 

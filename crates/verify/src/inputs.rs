@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::breaklines::BreaklineEdges;
+use crate::clip::ClipArea;
 use crate::keyed_records::{KeyedRecord, KeyedRecords};
 use crate::report::ReportedFacts;
-use crate::source_grid::SourceGrid;
 use crate::surface::{Bound, Surface, SurfaceProof};
 use delaunay::geometry::Site;
 use ground::{CoveredArea, Ground, LowestHeights, PointCollector, Scale};
@@ -25,6 +25,7 @@ use points::{
 };
 use rust_decimal::prelude::ToPrimitive;
 use sys::{Error, Result, Warnings, interrupt};
+use terrain::SourceGrid;
 use tiles::frame::Extras;
 
 /// The number of the source of a vertex. Inputs have the numbers above it.
@@ -101,6 +102,8 @@ pub(super) struct Inputs<'a> {
     scale: Scale,
     sources: Vec<Source>,
     files: &'a [PathBuf],
+    /// The area that the job kept points in; `None` for everywhere.
+    clip: Option<ClipArea>,
 }
 
 impl<'a> Inputs<'a> {
@@ -146,7 +149,8 @@ impl<'a> Inputs<'a> {
             horizontal: extras.resolution * extras.metres_per_unit,
             vertical: extras.resolution_z * extras.metres_per_unit_z,
         };
-        Ok(Inputs { facts, lattice, scale, sources, files })
+        let clip = clip_area(facts, &lattice)?;
+        Ok(Inputs { facts, lattice, scale, sources, files, clip })
     }
 
     /// Compares the vertices in `places` with the points of the inputs, and with the ends of the edges along breaklines. Points that are no
@@ -246,7 +250,16 @@ impl<'a> Inputs<'a> {
             let _ahead = source.read_ahead(rules.bounds.as_ref(), false)?;
             (0..source.chunks()).into_par_iter().try_for_each(|chunk| {
                 interrupt::check()?;
-                take(number, &|sink| source.decode(chunk, &rules, sink).map(drop))
+                take(number, &|sink| {
+                    let within = &mut |points: &[Point]| match &self.clip {
+                        None => sink(points),
+                        Some(clip) => {
+                            let is_inside = |point: &&Point| clip.holds(point.position);
+                            sink(&points.iter().filter(is_inside).copied().collect::<Vec<_>>())
+                        }
+                    };
+                    source.decode(chunk, &rules, within).map(drop)
+                })
             })?;
             first_order += source.records;
         }
@@ -275,6 +288,8 @@ impl<'a> Inputs<'a> {
             classes: input.map_or([true; 256], |input| input.kept_classes()),
             returns: input.map_or(KeptReturns::All, |input| input.kept_returns()),
             bounds: input.and_then(|input| input.bounds).and_then(|bounds| source.raw_bounds(bounds.0)),
+            // The proof decides in its own way which points lie within polygons.
+            clip: None,
             first_order,
             numbered: true,
             fields: OptionalFields::default(),
@@ -352,6 +367,17 @@ pub(super) fn lattice_of(facts: &ReportedFacts, extras: &Extras) -> Result<Latti
         resolution: decimal(extras.resolution)?,
         resolution_z: decimal(extras.resolution_z)?,
     })
+}
+
+/// Returns the area that the job kept points in; `None` for everywhere.
+fn clip_area(facts: &ReportedFacts, lattice: &Lattice) -> Result<Option<ClipArea>> {
+    let Some(clip) = &facts.clip else { return Ok(None) };
+    match lattice.polygons_of_text(&clip.area) {
+        Some(polygons) => Ok(Some(ClipArea::new(&polygons))),
+        None => {
+            Err(Error::Config("report.json: the area of clip is no MULTIPOLYGON on the lattice of the tiles".into()))
+        }
+    }
 }
 
 /// In what the vertices and the points of the inputs differ.

@@ -39,7 +39,7 @@
 //!
 //! # Triangles that are left out
 //!
-//! The triangles that `[output] hull` and `max_edge` leave out of the terrain are in `cut/`. All checks are made on the triangles in `tiles/`
+//! The triangles that `[output] hull`, `max_edge` and `[input] clip` leave out of the terrain are in `cut/`. All checks are made on the triangles in `tiles/`
 //! and `cut/` together, except that normals and colours are not compared with `cut/`, which has none. If the report or
 //! the list of files shows that some of `cut/` is gone, only checks 1, 4 and the first sentence of 2 are made, and check 3 between
 //! the triangles that are there; the verdict says so.
@@ -50,6 +50,11 @@
 //! the third corners of its triangles must lie outside the closed disc that has the edge as its diameter. As the mesh is Delaunay, no other
 //! vertex lies in that disc either. The number of edges is compared with the report. Which points of the inputs lay in a disc or
 //! in a lake, and were dropped, is not proved one by one: [`verify_against`] compares their number with the report.
+//!
+//! # Points within polygons
+//!
+//! With `[input] clip`, the report has the polygons on the lattice. [`verify_against`] decides anew, and in another way, which points of the
+//! inputs lie within them (`clip.rs`): these, and no others, must be vertices. That the polygons are those of a file is not proved.
 //!
 //! # Selected points
 //!
@@ -68,8 +73,8 @@
 mod border;
 mod border_matching;
 mod breaklines;
+mod clip;
 mod digest;
-mod error;
 mod exact;
 mod failures;
 mod file_search;
@@ -80,7 +85,6 @@ mod inputs;
 mod keyed_records;
 mod mesh_check;
 mod report;
-mod source_grid;
 mod surface;
 mod tile_files;
 mod verdict;
@@ -93,8 +97,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 pub use digest::{Digest, digest_of};
-pub use error::{Error, Result};
-pub use source_grid::{SourceGrid, SourceGridError};
+pub use terrain::{Error, Result, SourceGrid, SourceGridError};
 pub use verdict::{Conclusion, Verdict};
 
 use crate::border_matching::Borders;
@@ -108,8 +111,8 @@ use crate::surface::Surface;
 use crate::tile_files::TileFiles;
 use crate::verdict::CheckedMesh;
 use crate::written_files::WrittenFiles;
-use sys::{address_space, disk};
-use tiles::file_names::OutputFiles;
+use sys::address_space;
+use terrain::refuse_unfinished;
 use tiles::gltf::read::{TileFile, read_tile};
 
 /// Checks what is in the output `directory` of a job within about `memory` bytes. The verdict lists what does not hold.
@@ -174,17 +177,6 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
         inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, run.surface, lines.as_ref(), &grid));
     let proof = proof.transpose()?;
     Ok(Verdict::new(CheckedMesh { files: &files, findings, matches, lines: checked_lines }, &report, &written, proof))
-}
-
-/// Refuses results among which some may be of one job and some of another: a job has a journal until all its results are in place,
-/// and removes the report of the job before first.
-fn refuse_unfinished(directory: &Path) -> Result<()> {
-    let output = OutputFiles::new(directory);
-    let is_there = |path: PathBuf| disk::exists(&path).map_err(sys::Error::io("read", &path));
-    if is_there(output.journal())? && !is_there(output.report())? {
-        return Err(Error::Unfinished { directory: directory.into() });
-    }
-    Ok(())
 }
 
 /// What the threads share that check files.

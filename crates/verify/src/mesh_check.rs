@@ -8,8 +8,8 @@ use crate::exact::{EdgeState, double_area, edge_state, side};
 use crate::failures::Failure;
 use crate::findings::Findings;
 use crate::half_edges::HalfEdgesByOrigin;
-use crate::source_grid::SourceGrid;
 use delaunay::geometry::Site;
+use terrain::SourceGrid;
 use tiles::attributes::PointAttributes;
 use tiles::gltf::read::TilePart;
 
@@ -36,29 +36,13 @@ pub(super) fn check_mesh(
 
 /// Returns the lattice integers of the vertices, or `None` if some are not on the lattice.
 fn lattice_points(mesh: &TilePart, tile: u32, grid: &SourceGrid, findings: &mut Findings) -> Option<Vec<[i32; 3]>> {
-    let as_plain = |world| grid.integers(world);
-    let as_quantized = |world| grid.integers_on(world, mesh.scale);
-    // A plain mesh has the scale 1. So has a quantized mesh with steps of one metre.
-    let may_be_plain = mesh.scale == [1.0; 3];
-    let plain = if may_be_plain { points_of(mesh, as_plain) } else { None };
-    let points = plain.or_else(|| points_of(mesh, as_quantized));
+    let points = grid.points_of(mesh);
     if points.is_none() {
-        for world in (0..mesh.positions.len()).map(|v| mesh.world(v)) {
-            let point = if may_be_plain { as_plain(world) } else { as_quantized(world) };
-            if point.is_none() {
-                findings.failures.note(Failure::OffLattice, tile, || format!("{world:?} m"));
-            }
+        for world in grid.strays_of(mesh) {
+            findings.failures.note(Failure::OffLattice, tile, || format!("{world:?} m"));
         }
     }
     points
-}
-
-fn points_of(mesh: &TilePart, integers: impl Fn([f64; 3]) -> Option<[i32; 3]>) -> Option<Vec<[i32; 3]>> {
-    let mut points = Vec::with_capacity(mesh.positions.len());
-    for v in 0..mesh.positions.len() {
-        points.push(integers(mesh.world(v))?);
-    }
-    Some(points)
 }
 
 struct MeshCheck<'a> {

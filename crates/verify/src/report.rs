@@ -25,6 +25,8 @@ pub(super) struct ReportedFacts {
     pub(super) breaklines: Option<ReportedBreaklines>,
     /// How the vertices were selected; `None` if all points are vertices.
     pub(super) selection: Option<ReportedSelection>,
+    /// The area that points were kept in; `None` for everywhere.
+    pub(super) clip: Option<ReportedClip>,
     /// What became of the points of the inputs.
     pub(super) points: Option<ReportedPoints>,
     pub(super) lattice: Option<Lattice>,
@@ -58,6 +60,13 @@ pub(super) struct ReportedSelection {
     pub(super) max_error: f64,
     /// The points that vertices were selected from: places, not those at the same place.
     pub(super) points: u64,
+}
+
+/// What a report says of the area that points were kept in.
+#[derive(Clone, Debug, Deserialize)]
+pub(super) struct ReportedClip {
+    /// Its polygons on the lattice, as well-known text.
+    pub(super) area: String,
 }
 
 /// What a report says of points.

@@ -96,6 +96,7 @@ fn rules(source: &Source) -> Option<PointRules> {
         classes: [true; 256],
         returns: KeptReturns::All,
         bounds: None,
+        clip: None,
         first_order: 5,
         numbered: true,
         fields: OptionalFields { rgb: true, intensity: true },

@@ -22,6 +22,10 @@ pub(super) fn prepare(folder: &Path, job: &Table) {
         cloud(folder, &name, input.as_table().unwrap());
     }
     let crs = input.get("crs").and_then(Value::as_str).and_then(|crs| crs.strip_prefix("EPSG:"));
+    if let Some(clip) = input.get("clip").and_then(Value::as_str) {
+        let square = vec![[-90.0, -90.0, 0.0], [90.0, -90.0, 0.0], [90.0, 90.0, 0.0], [-90.0, 90.0, 0.0]];
+        write_features(folder, clip, &Features::areas(&[("area", vec![square])]), crs);
+    }
     for lines in job.get("breaklines").and_then(Value::as_array).into_iter().flatten() {
         texts(&lines["files"]).iter().for_each(|name| write_lines(folder, name, lines.as_table().unwrap(), crs));
     }
@@ -93,12 +97,16 @@ fn write_lines(folder: &Path, name: &str, options: &Table, crs: Option<&str>) {
         let lines: Vec<_> = values.iter().enumerate().map(|(i, value)| (value.as_str(), line(i))).collect();
         Features::lines(&lines)
     };
-    let features = features.with_attribute(attribute);
+    write_features(folder, &name, &features.with_attribute(attribute), crs);
+}
+
+fn write_features(folder: &Path, name: &str, features: &Features, crs: Option<&str>) {
+    let path = folder.join(name);
     match path.extension().and_then(|extension| extension.to_str()) {
-        Some("shp") => drop(shapefile(folder, name.strip_suffix(".shp").unwrap(), &features)),
-        Some("gpkg") => drop(geopackage(folder, &name, &features)),
+        Some("shp") => drop(shapefile(folder, name.strip_suffix(".shp").unwrap(), features)),
+        Some("gpkg") => drop(geopackage(folder, name, features)),
         Some("geojson") => {
-            let text = fs::read_to_string(geojson(folder, &name, &features)).unwrap();
+            let text = fs::read_to_string(geojson(folder, name, features)).unwrap();
             fs::write(path, text.replace("32633", crs.unwrap_or("32633"))).unwrap();
         }
         _ => panic!("no test makes lines such as {name}"),

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 const LEAST: &str = "[input]\nfiles = [\"a.laz\"]\n[output]\ndirectory = \"out\"\n";
 
 /// The tables of a configuration.
-pub(super) const TABLES: [&str; 9] = [
+pub(super) const TABLES: [&str; 10] = [
     "[input]",
     "[input.bare_earth]",
     "[input.csv]",
@@ -17,6 +17,7 @@ pub(super) const TABLES: [&str; 9] = [
     "[gpu]",
     "[output]",
     "[output.raster]",
+    "[output.contours]",
     "[limits]",
 ];
 
@@ -51,6 +52,7 @@ pub(super) fn load(table: &str, key: &str, value: Value) -> Result<(), String> {
             drop(whole["input"].as_table_mut().unwrap().insert("surface".into(), "bare-earth".into()))
         }
         "[[breaklines]]" => drop(place.insert("files".into(), vec!["a.gpkg"].into())),
+        "[output.contours]" if key != "levels" => drop(place.insert("interval".into(), Value::Float(1.0))),
         "[output.raster]" => drop(place.insert("resolution".into(), Value::Float(1.0))),
         _ if names.len() == 1 => {
             place = whole.get(names[0]).and_then(Value::as_table).cloned().unwrap_or_default();

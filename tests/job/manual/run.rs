@@ -156,6 +156,7 @@ impl Place {
         match words[0].as_str() {
             "view" => return self.view(&words, at),
             "verify" if !self.folder.path().join(&words[1]).exists() => self.run_job(),
+            "diff" => words[1..3].iter().for_each(|output| self.copy_output(output)),
             "sample" if !words.iter().any(|word| word == "--points") => insert(&mut words, &["--points", "1000"]),
             // It writes the configuration that is there already.
             "init" => _ = fs::remove_file(self.folder.path().join("job.toml")),
@@ -165,6 +166,16 @@ impl Place {
         }
         let said = gdt_batch(self.folder.path(), &words);
         assert_eq!(said.code, 0, "{at}: {words:?}: {}", said.err);
+    }
+
+    /// Puts a copy of the results in the folder of this name, if it is not there.
+    fn copy_output(&self, name: &str) {
+        let to = self.folder.path().join(name);
+        if !to.exists() {
+            self.run_job();
+            let out = self.folder.path().join("out");
+            assert!(Command::new("cp").arg("-r").arg(out).arg(to).status().unwrap().success());
+        }
     }
 
     /// Returns the files that a word stands for, as a shell would. They are made, or come from the repository, if they are not there.

@@ -70,6 +70,67 @@ pub fn write_pending_lines(path: &Path, lines: impl IntoIterator<Item = Result<S
     writer.flush().map_err(Error::io("write", &partial))
 }
 
+/// Writes a pending file, one piece after the other.
+pub struct PendingWriter {
+    path: PathBuf,
+    partial: PathBuf,
+    writer: BufWriter<OwnFile>,
+    hasher: Xxh3,
+    bytes: u64,
+}
+
+/// A file that is written from its beginning on.
+struct OwnFile {
+    file: File,
+    at: u64,
+}
+
+impl Write for OwnFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let mut from = WriteFrom { file: &self.file, at: self.at };
+        let written = from.write(bytes)?;
+        self.at = from.at;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl PendingWriter {
+    /// Creates the pending file of `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn create(path: &Path) -> Result<PendingWriter> {
+        const BUFFER: usize = 1 << 20;
+        let partial = partial_path(path);
+        let file = disk::create(&partial).map_err(Error::io("create", &partial))?;
+        let writer = BufWriter::with_capacity(BUFFER, OwnFile { file, at: 0 });
+        Ok(PendingWriter { path: path.into(), partial, writer, hasher: Xxh3::new(), bytes: 0 })
+    }
+
+    /// Appends a piece.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(&mut self, piece: &[u8]) -> Result<()> {
+        self.hasher.update(piece);
+        self.bytes += piece.len() as u64;
+        self.writer.write_all(piece).map_err(Error::io("write", &self.partial))
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn finish(mut self) -> Result<PendingFile> {
+        self.writer.flush().map_err(Error::io("write", &self.partial))?;
+        Ok(PendingFile { path: self.path, bytes: self.bytes, checksum: Checksum::of_hasher(&self.hasher) })
+    }
+}
+
 /// Returns the pending file of `path` when something else has written it under its [`partial_path`].
 ///
 /// # Errors
@@ -82,12 +143,13 @@ pub fn find_pending(path: &Path) -> Result<PendingFile> {
 
 /// Returns the name under which the file at `path` waits until it is whole.
 pub fn partial_path(path: &Path) -> PathBuf {
-    // A world file has the name of its picture but for the ending, and the raster that of the scene of all tiles.
-    path.with_extension(match path.extension() {
-        Some(ending) if ending == "pgw" => "pgw.partial",
-        Some(ending) if ending == "tif" => "tif.partial",
-        _ => "partial",
-    })
+    // A world file has the name of its picture but for the ending, and others that of the scene of all tiles.
+    const SAME_NAMES: [&str; 6] = ["pgw", "tif", "xml", "dxf", "obj", "ply"];
+    let ending = path.extension().and_then(|ending| SAME_NAMES.into_iter().find(|same| ending == *same));
+    match ending {
+        Some(ending) => path.with_extension(format!("{ending}.partial")),
+        None => path.with_extension("partial"),
+    }
 }
 
 /// How many threads wait for the disk at the same time.

@@ -9,6 +9,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use sys::{Error, Result, disk};
 use tiles::file_names::OutputFiles;
+use tiles::raster::products::RasterProduct;
 
 /// The number of files that the records of a store are dealt out to.
 pub const STORE_FILES: usize = 8;
@@ -87,9 +88,24 @@ impl JobDirectory {
         self.job.join("plan.json")
     }
 
-    /// Returns the path of the file in which the blocks of the raster wait.
-    pub fn raster_blocks(&self) -> PathBuf {
-        self.job.join("raster.blocks")
+    /// Returns the path of the file in which the blocks of a raster wait.
+    pub fn raster_blocks(&self, product: RasterProduct) -> PathBuf {
+        self.job.join(format!("{}.blocks", product.names()[1]))
+    }
+
+    /// Returns the paths of the files in which the numbered mesh waits for its exports: vertices and triangles.
+    pub fn exported_mesh(&self) -> [PathBuf; 2] {
+        ["exports.vertices", "exports.triangles"].map(|name| self.job.join(name))
+    }
+
+    /// Returns the path of the file in which the pieces of contour lines wait.
+    pub fn contour_chains(&self) -> PathBuf {
+        self.job.join("contours.chains")
+    }
+
+    /// Returns the path of the file in which the boxes of contour lines wait.
+    pub fn contour_boxes(&self) -> PathBuf {
+        self.job.join("contours.boxes")
     }
 
     /// Returns the path of the journal of complete phases.

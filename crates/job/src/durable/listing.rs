@@ -4,7 +4,9 @@ use crate::durable::atomic_file::partial_path;
 use std::path::{Path, PathBuf};
 use sys::{Error, Result, disk};
 use tiles::file_names::{MOST_FOLDERS_DEEP, OutputFiles, belongs_into, is_number};
+use tiles::options::ExportFormat;
 use tiles::page::is_page;
+use tiles::raster::products::PRODUCTS;
 
 /// What a job may have left.
 #[derive(Default)]
@@ -36,9 +38,11 @@ impl Leftovers {
             output.breaklines(),
             output.preview(),
             output.preview_world(),
-            output.raster(),
-            output.raster_list(),
+            output.contours(),
+            output.contour_drawing(),
         ];
+        files.extend(PRODUCTS.into_iter().flat_map(|product| [output.raster(product), output.raster_list(product)]));
+        files.extend(ExportFormat::ALL.map(|format| output.export(format)));
         // People give their own pages this name too.
         if !is_page_of_others(output)? {
             files.push(output.page());

@@ -23,7 +23,7 @@ pub fn check_nothing_in_the_way(directory: &JobDirectory) -> Result<()> {
     let output = results.directory();
     let parts = if is_folder(&directory.parts())? { directory.folders_of_parts()? } else { Vec::new() };
     let mut own = vec![job.to_path_buf(), directory.parts(), directory.points_by_part()];
-    own.extend(results.numbered_folders().map(|(folder, _)| folder));
+    own.extend(results.numbered_folders().into_iter().map(|(folder, _)| folder));
     let [results, waiting] = [Leftovers::of(results)?, Leftovers::of(waiting)?];
     own.extend([results.no_folders, waiting.no_folders, results.folders].concat());
     let of_parts = parts.iter().flat_map(own_files);

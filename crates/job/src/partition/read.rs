@@ -58,7 +58,7 @@ fn with_notes(input: &PlannedInput, plan: &Plan, mut summary: PointSummary) -> P
     summary
 }
 
-/// What each input held, in the order of the inputs. Inputs without chunks are not listed.
+/// What each input held, in the order of the inputs. Inputs without chunks are not listed, unless they are left aside.
 #[derive(Default)]
 pub(crate) struct ByInput(pub(crate) Vec<(usize, PointSummary)>);
 
@@ -85,10 +85,11 @@ pub(crate) fn decode(
     buckets: &Buckets,
     stage: &Stage,
 ) -> Result<ByInput> {
+    let inputs: Vec<usize> = inputs.collect();
     let lines = plan.built_breaklines()?;
     set_network_memory(network_memory(&plan.options));
     let pass = Pass { plan, grid, buckets, lines: lines.as_deref(), malformed: AtomicU64::new(malformed) };
-    let mut by_input = pass.over(inputs, false, |input, chunk, sink| {
+    let mut by_input = pass.over(inputs.iter().copied(), false, |input, chunk, sink| {
         let counts = input.source.decode(chunk, &input.rules, sink)?;
         stage.advance(counts.read);
         Ok(counts)
@@ -103,6 +104,13 @@ pub(crate) fn decode(
             *summary += more;
         }
     }
+    for index in inputs {
+        if let Some(counts) = plan.inputs[index].source.counts_left_aside() {
+            stage.advance(counts.read);
+            by_input.0.push((index, PointSummary { counts, bounds: None }));
+        }
+    }
+    by_input.0.sort_by_key(|(index, _)| *index);
     Ok(by_input)
 }
 

@@ -70,7 +70,7 @@ pub(crate) fn check_places(
     let places: Vec<(&Source, Vec<[f64; 2]>)> = sources
         .iter()
         .zip(&common.extent.boxes)
-        .filter(|(source, _)| may_reach(source, options.bounds.map(|bounds| bounds.0)))
+        .filter(|(source, _)| may_reach(source, options.rectangle()))
         .map(|(source, claim)| (source, places(source, claim, common)))
         .filter(|(_, places)| !places.is_empty())
         .collect();

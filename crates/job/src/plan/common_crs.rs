@@ -330,12 +330,11 @@ pub fn horizontal_unit(
         Unit::Unknown => {
             let why = match chosen {
                 CrsChoice::None => {
-                    "[input] crs = \"none\" leaves records of coordinate systems and their units aside, and no column says a \
-                                    unit of length that is known"
+                    "[input] crs = \"none\" ignores the units that records of coordinate systems state, and no column states one"
                 }
-                _ => "no input says a unit of length that is known",
+                _ => "no input states a known unit of length",
             };
-            warnings.push(format!("{why}: coordinates are taken as metres (set [input] unit to say otherwise)"));
+            warnings.push(format!("{why}: metres assumed; fix: set [input] unit if they are not"));
             Ok((key_of(Unit::Metre), 1.0))
         }
         _ => Err(Error::Config(format!(

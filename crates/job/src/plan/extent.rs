@@ -57,10 +57,10 @@ impl Extent {
                 extent.max[axis] = extent.max[axis].max(max[axis]);
             }
         }
-        if let Some(bounds) = options.bounds {
+        if let Some(bounds) = options.rectangle() {
             for axis in 0..2 {
-                extent.min[axis] = extent.min[axis].max(bounds.0[axis]);
-                extent.max[axis] = extent.max[axis].min(bounds.0[axis + 2]);
+                extent.min[axis] = extent.min[axis].max(bounds[axis]);
+                extent.max[axis] = extent.max[axis].min(bounds[axis + 2]);
             }
         }
         for axis in 0..3 {
@@ -113,7 +113,12 @@ const SAMPLED_RECORDS: u64 = 4096;
 
 /// Returns the box of the points that have a class and a return that the job wants, among the first `records` records of each of `chunks`,
 /// to within [`MEASURE`] raw steps; `None` without a point.
-fn measure(source: &Source, options: &InputOptions, chunks: Range<usize>, records: u64) -> Result<Option<SourceBox>> {
+pub(crate) fn measure(
+    source: &Source,
+    options: &InputOptions,
+    chunks: Range<usize>,
+    records: u64,
+) -> Result<Option<SourceBox>> {
     if source.format == FileFormat::Text || source.measured().is_some() {
         return Ok(source.wanted_box());
     }
@@ -150,6 +155,7 @@ pub(crate) fn measuring_rules(source: &Source, options: &InputOptions, steps: [i
         classes: options.kept_classes(),
         returns: options.kept_returns(),
         bounds: None,
+        clip: None,
         first_order: 0,
         numbered: false,
         fields: OptionalFields::default(),

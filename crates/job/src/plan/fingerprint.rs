@@ -2,9 +2,11 @@
 
 use crate::options::JobOptions;
 use crate::plan::breaklines::line_files::line_paths;
+use crate::plan::clip::clip_path;
 use crate::plan::input_identity::{InputChange, InputIdentities, RenamedInputs};
 use crate::plan::inputs::input_paths;
 use crate::plan::lattice_choice::LatticeCoarsening;
+use crate::records::JobStep;
 use crs::geoid::errors::not_opened;
 use crs::geoid::option::HeightOffset;
 use crs::geoid::require_file;
@@ -62,7 +64,7 @@ pub struct JobIdentity {
 
 /// Version of the records in the store, of the plan, of the names and bytes of results, and of which nodes merge. It changes with every
 /// change of these, so that no run misreads what another version left, or mixes its results with them.
-pub(crate) const LAYOUT: u32 = 31;
+pub(crate) const LAYOUT: u32 = 32;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -75,15 +77,25 @@ pub struct Fingerprint {
     style: Map<String, Value>,
     /// The inputs.
     files: InputIdentities,
-    /// The files of lines, with those that belong to them.
+    /// The files of lines and the one of the clip, with those that belong to them.
     #[serde(default)]
     lines: InputIdentities,
     /// The memory limit in bytes. Only the number of levels depends on it.
     pub memory: u64,
 }
 
-/// The name of the raster's options among those of the style. No tile depends on them.
-const RASTER: &str = "[output] raster";
+/// The names of options among those of the style that no tile depends on: what they ask for is made from the finished tiles, each by a step
+/// of its own.
+const FROM_TILES: [(&str, JobStep); 3] = [
+    ("[output] raster", JobStep::Raster),
+    ("[output] contours", JobStep::Contours),
+    ("[output] export", JobStep::Exports),
+];
+
+/// Returns the step that makes what an option asks for from the finished tiles, if it is one of these.
+fn step_of(option: &str) -> Option<JobStep> {
+    FROM_TILES.iter().find(|(name, _)| *name == option).map(|(_, step)| *step)
+}
 
 /// What to do about a job that is no longer what tasks planned.
 pub(crate) const PLAN_AGAIN: &str = "run the phase plan again, or let gdt-batch submit do it";
@@ -93,8 +105,13 @@ pub(crate) const PLAN_AGAIN: &str = "run the phase plan again, or let gdt-batch 
 pub enum JobChange {
     /// In nothing that matters.
     Nothing,
-    /// In the raster alone, which is made from the finished tiles: the text says in what.
-    Raster(String),
+    /// In files alone that are made from the finished tiles, such as the raster.
+    FromTiles {
+        /// Says in what.
+        what: String,
+        /// The steps that make the files that are others.
+        steps: Vec<JobStep>,
+    },
     /// In the style of its tiles: the text says in what.
     Style(String),
     /// In its mesh: the text says in what.
@@ -108,14 +125,16 @@ impl Fingerprint {
     /// [`Error::Config`] if there are no inputs, [`Error::Io`] if one cannot be read.
     pub fn of(options: &JobOptions) -> Result<Fingerprint> {
         let files = InputIdentities::of(&input_paths(&options.input)?)?;
-        let lines: Vec<PathBuf> =
-            line_paths(&options.breaklines)?.iter().flat_map(|(_, path)| files_of_lines(path)).collect();
+        let of_lines = line_paths(&options.breaklines)?.into_iter().map(|(_, path)| path);
+        let of_clip = clip_path(&options.input)?.map(Path::to_path_buf);
+        let lines: Vec<PathBuf> = of_lines.chain(of_clip).flat_map(|path| files_of_lines(&path)).collect();
         Fingerprint::of_files(options, files, InputIdentities::of(&lines)?)
     }
 
     fn of_files(options: &JobOptions, files: InputIdentities, lines: InputIdentities) -> Result<Fingerprint> {
         let order = if cfg!(target_endian = "little") { "little-endian" } else { "big-endian" };
-        let mut mesh = named_values(&options.input, "input", &["files"])?;
+        let mut mesh = named_values(&options.input, "input", &["files", "clip"])?;
+        mesh.insert("[input] clip".into(), options.input.clip.is_some().into());
         mesh.extend(named_values(&options.triangulation, "triangulation", &["backend"])?);
         for (number, lines) in (1..).zip(&options.breaklines) {
             mesh.extend(named_values(lines, &format!("breaklines {number}"), &["files"])?);
@@ -176,7 +195,7 @@ impl Fingerprint {
         match without_times(self).since(&without_times(planned)) {
             JobChange::Nothing if self.memory == planned.memory => None,
             JobChange::Nothing => Some("[limits] memory".into()),
-            JobChange::Raster(what) | JobChange::Style(what) | JobChange::Mesh(what) => Some(what),
+            JobChange::FromTiles { what, .. } | JobChange::Style(what) | JobChange::Mesh(what) => Some(what),
         }
     }
 
@@ -227,7 +246,10 @@ impl Fingerprint {
         let style = changed_values(&earlier.style, &self.style);
         match (mesh.is_empty(), style.is_empty()) {
             (false, _) => JobChange::Mesh(first_few(mesh)),
-            (true, false) if style.iter().all(|name| name == RASTER) => JobChange::Raster(first_few(style)),
+            (true, false) if style.iter().all(|name| step_of(name).is_some()) => {
+                let steps = style.iter().filter_map(|name| step_of(name)).collect();
+                JobChange::FromTiles { what: first_few(style), steps }
+            }
             (true, false) => JobChange::Style(first_few(style)),
             (true, true) => JobChange::Nothing,
         }

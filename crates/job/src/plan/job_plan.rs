@@ -4,6 +4,7 @@ use crate::durable::atomic_file::{PendingFile, write_pending};
 use crate::index::PartIndex;
 use crate::options::JobOptions;
 use crate::plan::breaklines::PlannedBreaklines;
+use crate::plan::clip::PlannedClip;
 use crate::plan::ground_triangles::GroundTriangles;
 use crate::plan::input_identity::RenamedInputs;
 use crate::plan::lattice_choice::LatticeCoarsening;
@@ -12,6 +13,7 @@ use breaklines::Breaklines;
 use crs::Crs;
 use delaunay::geometry::Bounds;
 use lattice::Lattice;
+use points::options::InputOptions;
 use points::{PointCounts, PointRules, Source};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -63,6 +65,9 @@ pub struct Plan {
     /// The breaklines; `None` without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub breaklines: Option<PlannedBreaklines>,
+    /// The area that points are kept in; `None` for everywhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clip: Option<PlannedClip>,
     /// A sentence about a few points that stretch the area, if there are some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stretch: Option<String>,
@@ -180,6 +185,13 @@ impl Plan {
         lines.map_or(points, |lines| lines.union(points))
     }
 
+    /// Returns the rectangle in source units that `bounds` and the box of `clip` share: [xmin, ymin, xmax, ymax]. Outside of it no point is
+    /// wanted.
+    pub(crate) fn rectangle(&self) -> Option<[f64; 4]> {
+        let clip_box = self.clip.as_ref().map(|clip| clip.reach);
+        InputOptions { clip_box, ..self.options.input.clone() }.rectangle()
+    }
+
     /// Returns what the user should know about the options and the inputs.
     pub fn all_warnings(&self) -> Warnings {
         let mut warnings = self.options.warnings.clone();
@@ -194,6 +206,7 @@ impl Plan {
         self.inputs.iter_mut().for_each(|input| renamed.rename(&mut input.source.path));
         self.skipped.iter_mut().for_each(|skipped| skipped.rename(renamed));
         self.breaklines.iter_mut().flat_map(|lines| &mut lines.files).for_each(|file| renamed.rename(file));
+        self.clip.iter_mut().for_each(|clip| renamed.rename(&mut clip.file));
         self.warnings.iter_mut().for_each(|warning| renamed.rename_in(warning));
     }
 
@@ -212,6 +225,15 @@ impl Plan {
     /// [`Error::Io`] if the file cannot be read, [`Error::Broken`] if it holds no plan.
     pub fn read(path: &Path) -> Result<Plan> {
         let text = std::fs::read(path).map_err(Error::io("read", path))?;
-        serde_json::from_slice(&text).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))
+        let plan: Plan =
+            serde_json::from_slice(&text).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
+        Ok(plan.with_area_in_rules())
+    }
+
+    /// Gives the rules of all inputs the area that points are kept in, which is written once for all of them.
+    fn with_area_in_rules(mut self) -> Plan {
+        let area = self.clip.as_ref().map(PlannedClip::area);
+        self.inputs.iter_mut().for_each(|input| input.rules.clip = area.clone());
+        self
     }
 }

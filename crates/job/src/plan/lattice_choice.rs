@@ -52,14 +52,13 @@ pub(crate) fn choose_lattice(
         let (step, finest) = (horizontal.step, horizontal.finest);
         let size = extent.size(0).max(extent.size(1));
         warnings.push(format!(
-            "x and y are rounded to {step}: glTF's single precision cannot hold every triangle that an area of {size:.0} units may \
-             have in steps of {finest}"
+            "x and y are rounded to {step}, the finest step that glTF's single precision allows over {size:.0} units; the inputs have {finest}"
         ));
     }
     if vertical.step != vertical.finest {
         let (step, finest, size) = (vertical.step, vertical.finest, extent.size(2));
         warnings.push(format!(
-            "heights are rounded to {step}: glTF's single precision cannot hold {size:.0} units in steps of {finest}"
+            "heights are rounded to {step}, the finest step that glTF's single precision allows over {size:.0} units; the inputs have {finest}"
         ));
     }
     place(sources, extent, horizontal.step, vertical.step)

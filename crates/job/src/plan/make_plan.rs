@@ -4,8 +4,9 @@ use crate::options::JobOptions;
 use crate::plan::area_check::{CommonPlace, check_places};
 use crate::plan::area_hint::AreaHint;
 use crate::plan::breaklines::line_files::LineFiles;
-use crate::plan::breaklines::{CloudOfPlan, PlannedBreaklines, SystemOfPoints};
+use crate::plan::breaklines::{CloudOfPlan, PlannedBreaklines};
 use crate::plan::budget::network_memory;
+use crate::plan::clip::{ClipFile, PlannedClip};
 use crate::plan::common_crs::{common_crs, horizontal_unit};
 use crate::plan::extent::{Extent, SourceBox, to_float};
 use crate::plan::far_points::{extent_without_outliers, farthest_file};
@@ -26,9 +27,11 @@ use crate::plan::text_inputs::{
 };
 use crate::plan::zero_points::refuse_zero_points;
 use crs::CrsChoice;
+use crs::DatumRule;
 use delaunay::geometry::Bounds;
 use delaunay::geometry::REACH;
 use lattice::{AxisMap, Lattice, shortest_decimal};
+use points::lines::line_crs::SystemOfPoints;
 use points::options::{OnBadFile, UnitChoice};
 use points::surface_warnings::no_ground;
 use points::transform_sources::transform_sources;
@@ -157,9 +160,17 @@ fn try_plan(
     let height_metres = crs.vertical.or(is_known.then_some(metres));
     let system = SystemOfPoints { crs: &crs, height_metres, datums: options.input.datums };
     let lines = LineFiles::read(options, &system, &mut warnings)?;
+    // The outline of an area is seldom as exact as a datum, and moves no point.
+    let clip = ClipFile::read(options, &SystemOfPoints { datums: DatumRule::Close, ..system }, &mut warnings)?;
+    let wanted = &mut options.clone();
+    let options = within_clip(wanted, clip.as_ref().map(ClipFile::area_box));
+    clip.as_ref().map_or(Ok(()), |clip| clip.leave_files_aside(sources, &options.input))?;
     let mut extent = extent_without_outliers(sources, options, &wish)?;
     lines.extend_heights(&mut extent)?;
     let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
+    let planned_clip = clip.map(|clip| clip.on_lattice(&lattice)).transpose()?;
+    let wanted = &mut options.clone();
+    let options = within_clip(wanted, planned_clip.as_ref().map(|clip| clip.reach));
     if fineness(sources, &extent, &wish).is_coarse() {
         let row = farthest_row(sources, options, &extent)?;
         warnings.extend(row.or_else(|| farthest_file(sources, &extent)));
@@ -174,12 +185,12 @@ fn try_plan(
         ));
     }
     let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;
-    let clip = options.input.bounds.map(|b| lattice_clip(&lattice, b.0));
-    let rules = point_rules(sources, options, &lattice)?;
+    let within = options.input.rectangle().map(|rectangle| lattice_clip(&lattice, rectangle));
+    let rules = point_rules(sources, options, &lattice, planned_clip.as_ref())?;
     check_malformed_rows(sources, &rules, options)?;
     let (clipped, claimed_area) =
-        (lattice_extent(&lattice, &extent, clip), claimed_area(&lattice, sources, &extent, clip.is_some()));
-    let sample = HeightSample::take(sources, &rules, options.input.bounds.map(|bounds| bounds.0))?;
+        (lattice_extent(&lattice, &extent, within), claimed_area(&lattice, sources, &extent, within.is_some()));
+    let sample = HeightSample::take(sources, &rules, options.input.rectangle())?;
     let hint = AreaHint { sources, options, extent: &extent, clipped, lattice: &lattice, wish: &wish };
     if hint.shows_far_points(&sample) {
         return try_plan(sources, options, LatticeCoarsening { far_points: true, ..coarsening });
@@ -248,6 +259,7 @@ fn try_plan(
         frame,
         curvature: None,
         breaklines,
+        clip: planned_clip,
         stretch,
         warnings,
     };
@@ -382,7 +394,19 @@ fn lattice_extent(lattice: &Lattice, extent: &Extent, clip: Option<Bounds<2>>) -
     Bounds { min, max }
 }
 
-fn point_rules(sources: &[Source], options: &JobOptions, lattice: &Lattice) -> Result<Vec<PointRules>> {
+/// Returns the options with the box of the area that points are kept in, if there is one.
+fn within_clip(options: &mut JobOptions, clip_box: Option<[f64; 4]>) -> &JobOptions {
+    options.input.clip_box = clip_box;
+    options
+}
+
+fn point_rules(
+    sources: &[Source],
+    options: &JobOptions,
+    lattice: &Lattice,
+    clip: Option<&PlannedClip>,
+) -> Result<Vec<PointRules>> {
+    let clip = clip.map(PlannedClip::area);
     let fields = wanted_fields(options);
     let (classes, returns) = (options.input.kept_classes(), options.input.kept_returns());
     let numbered = options.input.needs_numbers();
@@ -390,8 +414,10 @@ fn point_rules(sources: &[Source], options: &JobOptions, lattice: &Lattice) -> R
     let mut rules = Vec::with_capacity(sources.len());
     for source in sources {
         let maps = [axis_map(source, 0, lattice)?, axis_map(source, 1, lattice)?, axis_map(source, 2, lattice)?];
-        let bounds = options.input.bounds.and_then(|bounds| source.raw_bounds(bounds.0));
-        rules.push(PointRules { maps, classes, returns, bounds, first_order, numbered, fields });
+        let of_text = options.input.clip_box.map(|clip_box| source.raw_rectangle(clip_box));
+        let bounds = options.input.rectangle().and_then(|rectangle| source.raw_bounds(rectangle)).or(of_text);
+        let clip = clip.clone();
+        rules.push(PointRules { maps, classes, returns, bounds, clip, first_order, numbered, fields });
         first_order += source.records;
     }
     Ok(rules)

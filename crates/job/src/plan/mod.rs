@@ -6,6 +6,7 @@ pub(crate) mod area_cure;
 pub(crate) mod area_hint;
 pub mod breaklines;
 pub mod budget;
+pub mod clip;
 pub mod common_crs;
 pub(crate) mod distinct_crs;
 pub mod extent;

@@ -21,6 +21,9 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> crate::Error {
         ));
     }
     let remedy = match plan.options.input.bounds.zip(box_of_inputs(plan)) {
+        _ if plan.clip.is_some() && counts.out_of_bounds + counts.outside_clip > 0 && counts.classes.is_empty() => {
+            outside_clip(plan)
+        }
         Some((bounds, inputs)) if counts.out_of_bounds > 0 && counts.classes.is_empty() => {
             compare(bounds.0, inputs, are_from_headers(plan))
         }
@@ -50,8 +53,12 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> crate::Error {
         0 => String::new(),
         dropped => format!(", {dropped} at breaklines or in lakes"),
     };
+    let outside_clip = match counts.outside_clip {
+        0 => String::new(),
+        count => format!(", {count} outside clip"),
+    };
     crate::Error::NoTerrain(format!(
-        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}{nodata}, {} out of bounds{at_breaklines}; \
+        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}{nodata}, {} out of bounds{outside_clip}{at_breaklines}; \
          {remedy}",
         counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
     ))
@@ -101,7 +108,7 @@ pub(crate) fn nothing_will_be_left(plan: &Plan) -> Result<Option<crate::Error>> 
         return Ok(None);
     }
     let inputs = || plan.inputs.iter().map(|input| (&input.source, &input.rules));
-    let bounds = plan.options.input.bounds.map(|bounds| bounds.0);
+    let bounds = plan.rectangle();
     let (within, beyond): (Vec<_>, Vec<_>) = inputs().partition(|(source, _)| may_reach(source, bounds));
     if within.iter().map(|(source, rules)| decoded_records(source, rules)).sum::<u64>() > MOST_RECORDS {
         return Ok(None);
@@ -114,19 +121,48 @@ pub(crate) fn nothing_will_be_left(plan: &Plan) -> Result<Option<crate::Error>> 
     Ok((counts.kept == 0).then(|| no_point_is_left(plan, &counts)))
 }
 
-fn compare(bounds: Rectangle, inputs: Rectangle, from_headers: bool) -> String {
-    let exchanged = [inputs[1], inputs[0], inputs[3], inputs[2]];
-    let hint = match meet(bounds, exchanged) && !meet(bounds, inputs) {
-        true => "; x and y look exchanged: bounds are [xmin, ymin, xmax, ymax]",
-        false => "",
+/// Returns a sentence about the area of the clip, and where the points are.
+fn outside_clip(plan: &Plan) -> String {
+    let Some((clip, inputs)) = plan.clip.as_ref().zip(box_of_inputs(plan)) else {
+        return "no point lies within the polygons of [input] clip".into();
     };
-    // Rounded outwards, so that they can be copied.
-    let [xmin, ymin] = [inputs[0], inputs[1]].map(|low| (low * 100.0).floor() / 100.0);
-    let [xmax, ymax] = [inputs[2], inputs[3]].map(|high| (high * 100.0).ceil() / 100.0);
-    let by_headers = if from_headers { " by their headers" } else { "" };
+    let crs = match plan.crs.is_named() {
+        true => format!(" in {}", plan.crs.label()),
+        false => String::new(),
+    };
+    let by_headers = if are_from_headers(plan) { " by their headers" } else { "" };
+    let (area, rectangle) = (rounded(clip.area_box), rounded(inputs));
+    let bounds = match plan.options.input.bounds {
+        Some(bounds) => format!(", [input] bounds are {:?}", bounds.0),
+        None => String::new(),
+    };
     format!(
-        "[input] bounds are {bounds:?}, and{by_headers} the inputs lie in [{xmin:.2}, {ymin:.2}, {xmax:.2}, {ymax:.2}]{hint}"
+        "the polygons of [input] clip ({}) lie in {area}{crs}{bounds}, and{by_headers} the inputs lie in {rectangle}{}",
+        clip.file.display(),
+        hint_of_exchange(clip.area_box, inputs, "the polygons have x before y in their file")
     )
+}
+
+/// Returns a hint if rectangles meet only with x and y exchanged, for which there is a `rule`.
+fn hint_of_exchange(wanted: Rectangle, inputs: Rectangle, rule: &str) -> String {
+    let exchanged = [inputs[1], inputs[0], inputs[3], inputs[2]];
+    match meet(wanted, exchanged) && !meet(wanted, inputs) {
+        true => format!("; x and y look exchanged: {rule}"),
+        false => String::new(),
+    }
+}
+
+/// Returns a rectangle as a text, rounded outwards, so that it can be copied.
+fn rounded(rectangle: Rectangle) -> String {
+    let [xmin, ymin] = [rectangle[0], rectangle[1]].map(|low| (low * 100.0).floor() / 100.0);
+    let [xmax, ymax] = [rectangle[2], rectangle[3]].map(|high| (high * 100.0).ceil() / 100.0);
+    format!("[{xmin:.2}, {ymin:.2}, {xmax:.2}, {ymax:.2}]")
+}
+
+fn compare(bounds: Rectangle, inputs: Rectangle, from_headers: bool) -> String {
+    let hint = hint_of_exchange(bounds, inputs, "bounds are [xmin, ymin, xmax, ymax]");
+    let by_headers = if from_headers { " by their headers" } else { "" };
+    format!("[input] bounds are {bounds:?}, and{by_headers} the inputs lie in {}{hint}", rounded(inputs))
 }
 
 fn meet(a: Rectangle, b: Rectangle) -> bool {

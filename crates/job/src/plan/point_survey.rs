@@ -127,7 +127,7 @@ impl<'a> PointSurvey<'a> {
         }
         let steps = [0, 1, 2].map(|axis| steps_of(source, axis));
         let rules = measuring_rules(source, options, steps)?;
-        let bounds = options.bounds.and_then(|bounds| source.raw_bounds(bounds.0));
+        let bounds = options.rectangle().and_then(|bounds| source.raw_bounds(bounds));
         Some(PointSurvey { source, rules: PointRules { bounds, numbered: true, ..rules }, steps })
     }
 

@@ -123,7 +123,7 @@ impl JobHeights<'_> {
                 .is_some_and(|found| found.kept == 0 && found.out_of_bounds > 0 && found.out_of_bounds == found.read)
         };
         // Bounds leave out whole files as a rule.
-        let mut out = self.sources.iter().filter(|_| self.options.input.bounds.is_none()).filter(is_out);
+        let mut out = self.sources.iter().filter(|_| self.options.input.rectangle().is_none()).filter(is_out);
         let source = out.next().filter(|_| self.sample.counts.kept > 0)?;
         let more = match out.count() {
             0 => String::new(),

@@ -16,6 +16,7 @@ use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::preflight::kept_points::{KeptPoints, has_filter};
 use crate::preflight::selection_estimate::estimated_vertices;
 use crate::progress::number_text::{grouped, mebibytes};
+use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::publish::raster::check::{check_raster, planned_raster};
@@ -28,7 +29,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::{fmt, io};
 use sys::terminal::one_line;
-use sys::{Error, Result, Warnings, address_space};
+use sys::{Error, Result, ShownWarning, Warnings, address_space};
 use tiles::options::MaxError;
 
 /// What a job would do.
@@ -124,6 +125,7 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
     check_raster(&plan)?;
+    check_contours(&plan)?;
     let threads = workers(options, plan.records)?;
     let mut preflight = if has_filter(&plan) {
         inspect_closely(&plan, threads)?
@@ -320,7 +322,7 @@ impl fmt::Display for Preflight {
             )?;
         }
         for warning in self.warnings.iter() {
-            writeln!(f, "warning: {}", one_line(warning))?;
+            writeln!(f, "{}", ShownWarning(warning))?;
         }
         write_skipped(f, self.files.len(), &self.skipped)
     }

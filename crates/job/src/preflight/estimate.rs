@@ -8,6 +8,8 @@ use crate::partition::tree_builder::buffer_bytes;
 use crate::plan::budget::{BYTES_PER_LEAF_SITE, network_memory, read_buffer_memory};
 use crate::plan::job_plan::{Plan, PlannedInput};
 use crate::preflight::kept_points::{KeptPoints, has_filter};
+use crate::publish::contours::write_contours::contour_memory;
+use crate::publish::exports::export_limits::most_triangles;
 use crate::publish::raster::check::planned_raster;
 use crate::publish::raster::write_raster::raster_memory;
 use delaunay::geometry::Bounds;
@@ -16,9 +18,10 @@ use std::path::{Path, PathBuf};
 use tiles::Compression;
 use tiles::attributes::AttributeChoice;
 use tiles::color::HeightRange;
-use tiles::options::{MaxEdge, OutputFormat, OutputOptions};
+use tiles::options::{ExportFormat, MaxEdge, OutputFormat, OutputOptions};
 use tiles::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
 use tiles::raster::options::RasterCompression;
+use tiles::raster::products::RasterProduct;
 
 /// Bytes that the packed point file takes for a point; 9 to 10 where points are dense.
 const BYTES_PER_POINT: u64 = 12;
@@ -79,14 +82,17 @@ impl DiskEstimate {
         let raster = raster_bytes(plan);
         let in_tiles = tile_bytes(points, tiles, &options.output, max_one_file, points > per_tile);
         let page = if options.output.page { PAGE } else { 0 };
-        let results = in_tiles + pixels * PREVIEW_PER_PIXEL + page + raster;
+        let (exports, mesh) = export_bytes(points, &options.output);
+        let results = in_tiles + pixels * PREVIEW_PER_PIXEL + page + raster + exports;
+        // The raster goes together before the mesh is numbered.
+        let beside = raster.max(mesh);
         // Leaves go while the results grow, unless all stay.
         let keeps_leaves = options.output.max_edge == MaxEdge::Auto || plan.keeps_mesh();
         let most = if keeps_leaves { store } else { border + waiting_leaves(plan, points, leaves, tiles) };
         // The points of a part stay until it is meshed; those of all others are gone by the last.
         let of_last = point_file / points.max(1) * points.min(plan.points_per_part());
-        let temporary = point_file.max(most + of_last.max(raster));
-        DiskEstimate { temporary, results, least: point_file.max(most + results + of_last.max(raster)) }
+        let temporary = point_file.max(most + of_last.max(beside));
+        DiskEstimate { temporary, results, least: point_file.max(most + results + of_last.max(beside)) }
     }
 }
 
@@ -148,10 +154,32 @@ fn raster_bytes(plan: &Plan) -> u64 {
     let files = grid.files(options.cells_per_file);
     let stored: u64 = files.iter().map(|cells| grid.part(*cells).stored_cells()).sum();
     let heads = files.len() as u64 * RASTER_FILE;
-    match options.compression {
-        RasterCompression::None => stored * size_of::<f32>() as u64 + heads,
+    let of_product = |product: RasterProduct| match options.compression {
+        RasterCompression::None => stored * u64::from(product.bits() / 8) + heads,
         // Three bytes for a cell of rough terrain, and a third more for overviews. Cells without a height take a thousandth.
-        RasterCompression::Deflate => grid.cells() * 4 + stored / 200 + heads,
+        RasterCompression::Deflate => grid.cells() * u64::from(product.bits() / 8) + stored / 200 + heads,
+    };
+    options.products.iter().map(of_product).sum()
+}
+
+/// Returns the bytes of the exports of a mesh of so many points, and those of the numbered mesh that they are written from. A format that
+/// has too many triangles is not written.
+fn export_bytes(points: u64, output: &OutputOptions) -> (u64, u64) {
+    /// A vertex and two triangles, each of three numbers.
+    const NUMBERED: u64 = 3 * 12;
+    let formats = output.export.formats().filter(|format| 2 * points <= most_triangles(*format));
+    let bytes: u64 = formats.map(|format| points * export_per_point(format)).sum();
+    (bytes, if bytes > 0 { points * NUMBERED } else { 0 })
+}
+
+/// Returns the bytes of an export for a point with its two triangles.
+fn export_per_point(format: ExportFormat) -> u64 {
+    match format {
+        // Coordinates have some ten digits, and numbers of vertices eight.
+        ExportFormat::Landxml => 120,
+        ExportFormat::Dxf => 400,
+        ExportFormat::Obj => 85,
+        ExportFormat::Ply => 3 * 8 + 2 * 13,
     }
 }
 
@@ -164,7 +192,8 @@ pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
     let buffers = buffer_bytes(points, per_tile, read_buffer_memory(options));
     let is_remote = |input: &PlannedInput| input.source.path.to_str().is_some_and(is_url);
     let buffers = if plan.inputs.iter().any(is_remote) { buffers + network_memory(options) } else { buffers };
-    PROCESS_MEMORY + leaves.max(levels).max(buffers).max(raster_memory(plan, threads))
+    PROCESS_MEMORY
+        + leaves.max(levels).max(buffers).max(raster_memory(plan, threads)).max(contour_memory(plan, threads))
 }
 
 fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {

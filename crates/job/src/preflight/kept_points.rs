@@ -14,7 +14,7 @@ const MOST_SAMPLED: usize = 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct KeptPoints(pub(crate) u64);
 
-/// What `bounds` and choices of classes and returns leave of an input, as far as its header tells.
+/// What `bounds`, `clip` and choices of classes and returns leave of an input, as far as its header tells.
 enum Share {
     Nothing,
     Everything,
@@ -22,7 +22,7 @@ enum Share {
 }
 
 impl KeptPoints {
-    /// Returns all points of the inputs whose boxes `bounds` meet.
+    /// Returns all points of the inputs whose boxes `bounds` and `clip` meet.
     pub(crate) fn by_headers(plan: &Plan) -> KeptPoints {
         let inputs = plan.inputs.iter().filter(|input| !matches!(share(plan, input), Share::Nothing));
         KeptPoints(inputs.map(PlannedInput::decoded_records).sum())
@@ -68,15 +68,16 @@ pub(crate) fn has_filter(plan: &Plan) -> bool {
 
 fn share(plan: &Plan, input: &PlannedInput) -> Share {
     let everything = if plan.options.input.chooses_kinds() { Share::Some } else { Share::Everything };
-    let Some(bounds) = plan.options.input.bounds else { return everything };
-    let [low, high] = [[bounds.0[0], bounds.0[1]], [bounds.0[2], bounds.0[3]]];
+    let Some([xmin, ymin, xmax, ymax]) = plan.rectangle() else { return everything };
+    let [low, high] = [[xmin, ymin], [xmax, ymax]];
     // A header that gives no box says nothing.
     let Some([min, max]) = input.source.claimed_rectangle() else { return Share::Some };
     let apart = (0..2).any(|axis| max[axis] < low[axis] || min[axis] > high[axis]);
     let inside = (0..2).all(|axis| min[axis] >= low[axis] && max[axis] <= high[axis]);
     match (apart, inside) {
         (true, _) => Share::Nothing,
-        (_, true) => everything,
+        // Of what is in the box of a clip, any part may be in its polygons.
+        (_, true) if plan.clip.is_none() => everything,
         _ => Share::Some,
     }
 }

@@ -1,4 +1,5 @@
-//! The stages of a job on the screen: a bar for each on a terminal, a line every ten seconds in a log, nothing with `--quiet`.
+//! The stages of a job on standard error: a bar for each on a terminal, a line every ten seconds in a log, JSON every second for programs,
+//! nothing with `--quiet`.
 
 use crate::progress::activity::Activity;
 use crate::progress::clock::JobClock;
@@ -6,6 +7,7 @@ use crate::progress::number_text::rough_time;
 use crate::progress::stats::StageStats;
 use crate::progress::time_left::TimeLeft;
 use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
+use serde_json::json;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,6 +16,9 @@ use sys::say;
 
 /// The time between two lines in a log.
 const LOG_INTERVAL: Duration = Duration::from_secs(10);
+
+/// The time between two lines for programs.
+const JSON_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Where progress goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,22 +29,22 @@ pub enum ProgressOutput {
     Bars,
     /// To a log, as lines.
     Lines,
+    /// To a program, as JSON objects, one a line.
+    Json,
 }
 
 impl ProgressOutput {
     /// Returns what suits standard error.
-    pub fn detect(quiet: bool) -> ProgressOutput {
-        match (quiet, std::io::stderr().is_terminal()) {
-            (true, _) => ProgressOutput::Quiet,
-            (false, true) => ProgressOutput::Bars,
-            (false, false) => ProgressOutput::Lines,
-        }
+    pub fn detect() -> ProgressOutput {
+        if std::io::stderr().is_terminal() { ProgressOutput::Bars } else { ProgressOutput::Lines }
     }
 
     /// Prints a note between two stages.
     pub fn note(self, text: &str) {
-        if self != ProgressOutput::Quiet {
-            say(text);
+        match self {
+            ProgressOutput::Quiet => {}
+            ProgressOutput::Json => say(&json!({ "note": text }).to_string()),
+            ProgressOutput::Bars | ProgressOutput::Lines => say(text),
         }
     }
 
@@ -126,9 +131,8 @@ impl StagePace {
 }
 
 fn style(unit: &str, pace: Arc<StagePace>) -> ProgressStyle {
-    let template = format!(
-        "{{prefix:>12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} of {{human_len}} {unit}, {{rate}}/s, {{left}} left of the job"
-    );
+    // At most 80 columns, with the longest of all names.
+    let template = format!("{{prefix:>14}} {{bar:16}} {{percent:>3}} %  {{rate}} {unit}/s, {{left}} left");
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
     // A bar that cannot be drawn must not end the job.
     let rate = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
@@ -158,7 +162,7 @@ impl Stage {
         match self.progress {
             ProgressOutput::Quiet => {}
             ProgressOutput::Bars => self.bar.set_position(done.min(self.pace.total)),
-            ProgressOutput::Lines => self.log(done),
+            ProgressOutput::Lines | ProgressOutput::Json => self.log(done),
         }
     }
 
@@ -175,16 +179,35 @@ impl Stage {
     fn log(&self, done: u64) {
         let Ok(mut logged) = self.logged.try_lock() else { return };
         let StagePace { name, total, .. } = *self.pace;
-        if logged.elapsed() < LOG_INTERVAL || done >= total {
+        let interval = if self.progress == ProgressOutput::Json { JSON_INTERVAL } else { LOG_INTERVAL };
+        if logged.elapsed() < interval || done >= total {
             return;
         }
         *logged = Instant::now();
+        if self.progress == ProgressOutput::Json {
+            return self.say_json(done, false);
+        }
         let percent = self.pace.share(&self.pace.done) * 100.0;
         say(&format!(
             "{name}: {percent:.0} % of {total} {}, {} left of the job",
             self.unit,
             rough_time(self.pace.left())
         ));
+    }
+
+    /// Prints how far the stage is, for programs.
+    fn say_json(&self, done: u64, is_finished: bool) {
+        let left = self.pace.left();
+        let line = json!({
+            "stage": self.pace.name,
+            "done": done,
+            "total": self.pace.total,
+            "unit": self.unit,
+            "finished": is_finished,
+            // JSON has no number for an estimate that is none.
+            "seconds_left": left.is_finite().then(|| left.round()),
+        });
+        say(&line.to_string());
     }
 
     /// Ends the stage and returns what it took.
@@ -200,6 +223,9 @@ impl Stage {
             done: done - taken_over,
             unit: self.unit.into(),
         };
+        if self.progress == ProgressOutput::Json {
+            self.say_json(done, true);
+        }
         if self.progress == ProgressOutput::Lines {
             say(&format!("{}: done, {} {} in {:.1} s", figures.stage, figures.done, self.unit, figures.wall_s));
         }

@@ -1,6 +1,8 @@
 //! Step 8: writes what is beside the tiles.
 
 pub(crate) mod classified;
+pub(crate) mod contours;
+pub(crate) mod exports;
 pub(crate) mod flat_tile;
 pub(crate) mod height_offset_check;
 pub(crate) mod one_file_limits;

@@ -141,12 +141,11 @@ pub(crate) fn heights_warning(crs: &Crs, offset: Option<&HeightOffset>) -> Optio
             return offset.filter(|offset| offset.is_model()).map(|_| ADDED_TWICE.into());
         }
         _ if offset.is_some() => return None,
-        Some(system) => format!("count from {}", system.label()),
-        None => "may count from the sea: no input says from what".to_string(),
+        Some(system) => format!("heights are above {}", system.label()),
+        None => "vertical datum unknown: heights may be above sea level".to_string(),
     };
     Some(format!(
-        "the heights {from}, and tileset.json is placed on the globe as if they counted from the ellipsoid, which may be tens of metres off; \
-         set [output] height_offset to \"egm96\" (a geoid of the whole earth), to the path of a geoid grid (.gtx or .tif), or to a number of \
-         metres; 0.0 leaves the heights as they are"
+        "{from}, not the ellipsoid, so the terrain may be tens of metres too low or high on the globe; fix: [output] height_offset = \
+         \"egm96\" or a geoid grid; 0.0 if they are above the ellipsoid"
     ))
 }

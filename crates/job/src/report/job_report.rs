@@ -10,8 +10,11 @@ use crate::plan::text_inputs::text_reading;
 use crate::progress::clock::JobClock;
 use crate::progress::number_text::grouped;
 use crate::progress::stats::StageStats;
+use crate::publish::contours::write_contours::ContourStats;
+use crate::publish::exports::write_exports::ExportedFile;
 use crate::publish::raster::write_raster::RasterStats;
 use crate::report::breakline_report::BreaklineReport;
+use crate::report::clip_report::ClipReport;
 use crate::report::selection_report::SelectionReport;
 use crate::tiles::write_tile::TileStats;
 use delaunay::voronoi::counts::STEP_NAMES;
@@ -44,7 +47,7 @@ pub struct Report {
     pub ground: Option<u64>,
     /// Triangles in all tiles.
     pub triangles: u64,
-    /// Triangles that `hull` or `max_edge` left out. They are in `cut`.
+    /// Triangles that `hull`, `max_edge` or `clip` left out. They are in `cut`.
     #[serde(default)]
     pub cut_triangles: u64,
     /// Those of them that `hull` left out: slivers along the hull.
@@ -60,6 +63,12 @@ pub struct Report {
     /// The raster of heights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub raster: Option<RasterStats>,
+    /// The files with the mesh for CAD and other programs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub exports: Vec<ExportedFile>,
+    /// The contour lines.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contours: Option<ContourStats>,
     /// The share of the triangles that cross a border between tiles.
     pub seam_share: f64,
     /// Points that were dropped because another has the same x and y.
@@ -76,6 +85,9 @@ pub struct Report {
     /// What came of the breaklines; `None` without any.
     #[serde(default)]
     pub breaklines: Option<BreaklineReport>,
+    /// The area that points were kept in; `None` for everywhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clip: Option<ClipReport>,
     /// How the leaves were triangulated.
     pub leaves: LeafStats,
     /// The GPU that helped; `None` without one.
@@ -214,6 +226,10 @@ pub struct ReportParts {
     pub levels: LevelStats,
     /// The raster.
     pub raster: Option<RasterStats>,
+    /// The mesh for other programs.
+    pub exports: Vec<ExportedFile>,
+    /// The contour lines.
+    pub contours: Option<ContourStats>,
     /// The number of parts.
     pub parts: u64,
     /// The part that took the longest.
@@ -285,6 +301,8 @@ impl Report {
             tiles: parts.tiles.files,
             levels: parts.levels,
             raster: parts.raster,
+            exports: parts.exports,
+            contours: parts.contours,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
             duplicates: parts.leaves.duplicates + parts.duplicates,
             files: plan.inputs.len(),
@@ -297,6 +315,7 @@ impl Report {
             },
             points: parts.points,
             breaklines: plan.breaklines.as_ref().map(BreaklineReport::of),
+            clip: plan.clip.as_ref().map(|clip| ClipReport::of(clip, &plan.lattice)),
             leaves: parts.leaves,
             gpu: parts.gpu,
             gpu_figures: parts.gpu_figures,

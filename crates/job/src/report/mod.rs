@@ -1,9 +1,11 @@
 //! The report of a finished job, for people and for machines.
 
 pub mod breakline_report;
+pub mod clip_report;
 pub mod job_report;
 pub mod job_status;
 pub mod selection_report;
 pub mod skipped_inputs;
+pub mod summary;
 mod table;
 pub mod task_outcome;

@@ -1,15 +1,13 @@
-//! The report as a table for people.
+//! The report as a table of all figures, for `--verbose`. [`crate::report::summary`] has what everyone should see.
 
 use crate::progress::number_text::{grouped, precise_mebibytes};
 use crate::report::breakline_report::BreaklineReport;
 use crate::report::job_report::{Report, SlowestPart, StepSeconds};
 use crate::report::selection_report::SelectionReport;
-use crate::report::skipped_inputs::write_skipped;
 use delaunay::triangulation::TriangulationCounts;
 use delaunay_gpu::figures::GpuFigures;
 use points::NetworkTraffic;
 use std::fmt;
-use sys::terminal::one_line;
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -42,9 +40,14 @@ impl fmt::Display for Report {
         if self.points.other_return > 0 {
             row("  of other returns", grouped(self.points.other_return))?;
         }
-        row("  out of bounds", grouped(self.points.out_of_bounds))?;
+        let out_of_bounds = if self.clip.is_some() { "  beyond bounds, clip's box" } else { "  out of bounds" };
+        row(out_of_bounds, grouped(self.points.out_of_bounds))?;
         if self.points.not_decoded > 0 {
-            row("    by the octree, not decoded", grouped(self.points.not_decoded))?;
+            let why = if self.clip.is_some() { "    not decoded" } else { "    by the octree, not decoded" };
+            row(why, grouped(self.points.not_decoded))?;
+        }
+        if self.clip.is_some() {
+            row("  outside clip's polygons", grouped(self.points.outside_clip))?;
         }
         if self.points.nodata > 0 {
             row("  nodata", grouped(self.points.nodata))?;
@@ -86,7 +89,8 @@ impl fmt::Display for Report {
             row("  left out (hull)", format!("{slivers}, with an edge longer than {length:.3} {}", self.unit))?;
         }
         if self.cut_triangles > self.hull_triangles {
-            row("  left out (max_edge)", grouped(self.cut_triangles - self.hull_triangles))?;
+            let why = if self.clip.is_some() { "  left out (max_edge, clip)" } else { "  left out (max_edge)" };
+            row(why, grouped(self.cut_triangles - self.hull_triangles))?;
         }
         row("tiles", grouped(self.tiles))?;
         if self.levels.files > 0 {
@@ -95,7 +99,17 @@ impl fmt::Display for Report {
         }
         if let Some(raster) = &self.raster {
             let [columns, rows] = raster.size.map(|side| grouped(side.into()));
-            row("raster", format!("{columns} x {rows} cells, {}", precise_mebibytes(raster.bytes)))?;
+            let products: Vec<&str> = raster.products.iter().map(|product| product.names()[0]).collect();
+            let (products, bytes) = (products.join(", "), precise_mebibytes(raster.bytes));
+            row("raster", format!("{columns} x {rows} cells ({products}), {bytes}"))?;
+        }
+        for export in &self.exports {
+            row("export", format!("{}, {}", export.file, precise_mebibytes(export.bytes)))?;
+        }
+        if let Some(contours) = &self.contours {
+            let [lines, points, levels] = [contours.lines, contours.points, contours.levels].map(grouped);
+            let size = precise_mebibytes(contours.bytes);
+            row("contours", format!("{lines} lines of {points} points, {levels} levels, {size}"))?;
         }
         let TriangulationCounts { pipeline, reference, small, crowded, not_accepted, counts } = &self.leaves.outcome;
         let divided = small + crowded + not_accepted;
@@ -151,9 +165,6 @@ impl fmt::Display for Report {
         }
         let peak = self.peak_memory.map_or("unknown".into(), precise_mebibytes);
         row("peak memory", format!("{peak} of {}", precise_mebibytes(self.memory_limit)))?;
-        for warning in self.warnings.iter() {
-            writeln!(f, "warning: {}", one_line(warning))?;
-        }
-        write_skipped(f, self.files, &self.skipped)
+        Ok(())
     }
 }

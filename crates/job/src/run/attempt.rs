@@ -14,6 +14,7 @@ use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
+use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::raster::check::check_raster;
 use crate::report::job_report::Report;
@@ -179,6 +180,7 @@ fn attempt(
     plan.warnings.extend(job.modified.clone());
     check_height_offset(&plan)?;
     check_raster(&plan)?;
+    check_contours(&plan)?;
     stage.advance(1);
     let planned = stage.finish();
     let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));

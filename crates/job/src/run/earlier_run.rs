@@ -144,7 +144,7 @@ impl EarlierRun {
         let (old, entry) = (self.header.as_ref()?, self.entries.iter().find(|entry| entry.step == JobStep::Plan)?);
         let change = header.fingerprint.since(&old.fingerprint);
         let is_same =
-            old.coarsening == header.coarsening && matches!(change, JobChange::Nothing | JobChange::Raster(_));
+            old.coarsening == header.coarsening && matches!(change, JobChange::Nothing | JobChange::FromTiles { .. });
         let plan = is_same && entry.files.iter().all(|file| file.is_whole(directory));
         let mut plan = plan.then(|| Plan::read(&directory.plan()).ok())??;
         plan.options = options.clone();
@@ -178,18 +178,25 @@ impl EarlierRun {
             return None;
         }
         let had_plan = kept.entries.iter().any(|entry| entry.step == JobStep::Plan);
-        if had_plan && !has_plan && matches!(change, JobChange::Nothing | JobChange::Raster(_)) {
+        if had_plan && !has_plan && matches!(change, JobChange::Nothing | JobChange::FromTiles { .. }) {
             // Another plan may bend the scene otherwise, if another machine makes it.
             progress.note("what the interrupted run left is damaged; starting over");
             return None;
         }
-        let (mut of_job, mut of_parts) =
-            (vec![JobStep::Plan, JobStep::Raster, JobStep::Classified, JobStep::Publish], Vec::new());
+        let mut of_job = vec![
+            JobStep::Plan,
+            JobStep::Raster,
+            JobStep::Contours,
+            JobStep::Exports,
+            JobStep::Classified,
+            JobStep::Publish,
+        ];
+        let mut of_parts = Vec::new();
         match &change {
             JobChange::Nothing => {}
-            JobChange::Raster(what) => {
+            JobChange::FromTiles { what, steps } => {
                 progress.note(&format!("changed since the interrupted run: {what}; the tiles stay"));
-                of_job = vec![JobStep::Plan, JobStep::Classified];
+                of_job.retain(|step| *step != JobStep::Publish && !steps.contains(step));
             }
             JobChange::Style(what) => {
                 let meshed = kept.parts.meshed();

@@ -43,7 +43,7 @@ pub(crate) fn finished_border(
     let frontier = Frontier::load(store, tree.leaf(tile))?;
     let PartialNormals { mut sums, rgb, class, intensity } = PartialNormals::load(store, tile)?;
     let slivers = HullSlivers::new(style.hull.as_ref(), &seam.trimmed);
-    if !style.max_edge.keeps_all() || !slivers.is_empty() {
+    if !style.keeps_all() || !slivers.is_empty() {
         take_left_out(store, tile, &frontier, &slivers, style, &mut sums)?;
     }
     let is_kept = |t: &SeamTriangle| !style.leaves_out(t.map(|corner| corner.position)) && !slivers.has(t);

@@ -1,6 +1,7 @@
 //! Steps 5 and 6: finishes the normals on the borders of tiles, and writes the tiles.
 
 pub(crate) mod border_normals;
+pub(crate) mod clip_rule;
 pub(crate) mod curve;
 pub(crate) mod dependencies;
 pub(crate) mod hull_slivers;

@@ -2,6 +2,7 @@
 
 use crate::mesh::hull_rule::HullRule;
 use crate::plan::job_plan::Plan;
+use crate::tiles::clip_rule::ClipRule;
 use crate::tiles::max_edge::MaxEdgeRule;
 use breaklines::Breaklines;
 use delaunay::geometry::Bounds;
@@ -30,6 +31,8 @@ pub(crate) struct TileStyle {
     pub compression: Compression,
     /// Which triangles are left out, unless they are flat water.
     pub max_edge: MaxEdgeRule,
+    /// Which triangles lie outside the polygons of the clip; `None` without one.
+    pub(crate) clip: Option<ClipRule>,
     /// The breaklines, which stay in coarser tiles, and whose flat water is never left out; `None` without any.
     pub lines: Option<Arc<Breaklines>>,
     /// Which triangles are slivers along the hull, which are left out too; `None` if they stay.
@@ -91,21 +94,30 @@ impl TileStyle {
         let copyright = output.copyright().map(str::to_owned);
         let OutputOptions { attributes, normals, .. } = *output;
         let lines = plan.built_breaklines()?;
-        Ok(TileStyle { frame, coloring, attributes, normals, compression, max_edge, lines, hull, copyright })
+        let clip = plan.clip.as_ref().map(|clip| ClipRule::new(clip.area(), output.selects()));
+        Ok(TileStyle { frame, coloring, attributes, normals, compression, max_edge, clip, lines, hull, copyright })
     }
 
-    /// Tells whether the triangle with these corners is left out because it is long. A lake has no points, and a river often has none, so
-    /// the triangles of their water are long.
+    /// Tells whether the triangle with these corners is left out because it lies outside the polygons of the clip, or is long. A lake has
+    /// no points, and a river often has none, so the triangles of their water are long.
     #[inline]
     pub(crate) fn leaves_out(&self, corners: [[i32; 3]; 3]) -> bool {
         let places = corners.map(|[x, y, _]| [x, y]);
+        if self.clip.as_ref().is_some_and(|clip| clip.leaves_out(places)) {
+            return true;
+        }
         let is_water = |lines: &Arc<Breaklines>| lines.is_water(places) || lines.is_between_shores(places);
         self.max_edge.leaves_out(corners) && !self.lines.as_ref().is_some_and(is_water)
     }
 
-    /// Removes the triangles that are left out because they are long from `triangles` and returns them. Both stay in order.
+    /// Tells whether no triangle at all is left out, apart from slivers along the hull.
+    pub(crate) fn keeps_all(&self) -> bool {
+        self.max_edge.keeps_all() && self.clip.is_none()
+    }
+
+    /// Removes the triangles that are left out because they lie outside or are long from `triangles` and returns them. Both stay in order.
     pub(crate) fn take_long(&self, positions: &[[i32; 3]], triangles: &mut Vec<[u32; 3]>) -> Vec<[u32; 3]> {
-        if self.max_edge.keeps_all() {
+        if self.keeps_all() {
             return Vec::new();
         }
         let (out, kept) = triangles.iter().partition(|t| self.leaves_out(t.map(|v| positions[v as usize])));

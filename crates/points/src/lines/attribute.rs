@@ -30,16 +30,22 @@ impl Attribute {
     }
 }
 
+/// The attribute with the name of a feature, in small or capital letters.
+pub(super) const NAME_FIELD: &str = "name";
+
 /// The attributes of a feature that the options ask for.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct WantedAttributes {
     pub(super) kind: Attribute,
     pub(super) height: Attribute,
+    /// Its name, which no feature has to have.
+    pub(super) name: Attribute,
 }
 
 impl WantedAttributes {
     /// Nothing, where the options ask for nothing.
-    pub(super) const NONE: WantedAttributes = WantedAttributes { kind: Attribute::Missing, height: Attribute::Missing };
+    pub(super) const NONE: WantedAttributes =
+        WantedAttributes { kind: Attribute::Missing, height: Attribute::Missing, name: Attribute::Missing };
 }
 
 /// Says that a file has no attribute of this name, and which ones it has.

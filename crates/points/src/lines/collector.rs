@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::lines::attribute::WantedAttributes;
 use crate::lines::feature::{LineFeature, LineShape, RawGeometry};
 use crate::lines::lake_rings::{Flaw, flaw_of, remove_repeated, simplified};
-use crate::lines::options::{LineHeights, LineOptions, kind_of_name};
+use crate::lines::options::{LineHeights, LineOptions, LinePurpose, kind_of_name};
 use breaklines::FeatureKind;
 use sys::{Error, Result, Warnings};
 
@@ -25,6 +25,7 @@ pub(super) struct FeatureCollector<'a> {
     crossing: LeftOut,
     hole_outside: LeftOut,
     enclosing_nothing: LeftOut,
+    without_area: LeftOut,
     not_looked_at: LeftOut,
     /// A part of the feature at hand that is left out.
     left_out: Option<Part>,
@@ -35,6 +36,8 @@ pub(super) struct FeatureCollector<'a> {
 enum Part {
     Line,
     Outline,
+    /// A line or a point where only polygons are read.
+    NoArea,
 }
 
 /// How many features are left out or doubtful for one reason, and the first of them, with a place.
@@ -83,6 +86,7 @@ impl<'a> FeatureCollector<'a> {
             of_other_kinds: LeftOut::default(),
             crossing: LeftOut::default(),
             hole_outside: LeftOut::default(),
+            without_area: LeftOut::default(),
             enclosing_nothing: LeftOut::default(),
             not_looked_at: LeftOut::default(),
         }
@@ -110,10 +114,14 @@ impl<'a> FeatureCollector<'a> {
         };
         let before = self.features.len();
         self.add_geometry(number, kind, height, geometry)?;
+        let name = attributes.name.text();
+        self.features.iter_mut().skip(before).for_each(|feature| feature.name.clone_from(&name));
         match (self.left_out.take(), self.features.len() > before) {
+            (Some(Part::NoArea), true) => self.without_area.note(number),
             (Some(_), true) => self.without_parts.note(number),
             (Some(Part::Line), false) => self.too_short.note(number),
             (Some(Part::Outline), false) => self.without_inside.note(number),
+            (Some(Part::NoArea), false) => self.without_area.note(number),
             (None, false) => self.without_geometry.note(number),
             (None, true) => {}
         }
@@ -138,6 +146,8 @@ impl<'a> FeatureCollector<'a> {
             "are areas whose outline encloses nothing (it has fewer than three vertices, lies on one line, or goes back over its own way) and \
              are left out",
         ));
+        warnings
+            .extend(self.without_area.warning("have lines or points, which are left out: only polygons are an area"));
         warnings.extend(self.without_parts.warning(
             "have a part that is left out: a line without two different vertices, or an outline that encloses nothing",
         ));
@@ -192,6 +202,10 @@ impl<'a> FeatureCollector<'a> {
     ) -> Result<()> {
         match geometry {
             RawGeometry::Empty => Ok(()),
+            RawGeometry::Other(_) | RawGeometry::Lines(_) if self.options.purpose == LinePurpose::Clip => {
+                self.left_out = Some(Part::NoArea);
+                Ok(())
+            }
             RawGeometry::Other(what) => Err(self.refuse(
                 number,
                 format!("is {what}: breaklines are lines or areas; leave it out, or make a line of it"),
@@ -224,7 +238,7 @@ impl<'a> FeatureCollector<'a> {
             }
             _ => LineShape::Line(line),
         };
-        self.features.push(LineFeature { number, kind, shape });
+        self.features.push(LineFeature { number, name: None, kind, shape });
         Ok(())
     }
 
@@ -239,6 +253,7 @@ impl<'a> FeatureCollector<'a> {
         let mut kept = Vec::with_capacity(rings.len());
         for (index, ring) in rings.into_iter().enumerate() {
             let mut ring = self.checked(number, height, ring)?;
+            self.check_closed(number, &ring)?;
             while ring.len() > 1 && is_closed(&ring) {
                 ring.pop();
             }
@@ -259,9 +274,24 @@ impl<'a> FeatureCollector<'a> {
             self.look_at_lake(number, &mut kept)?;
         }
         if !kept.is_empty() {
-            self.features.push(LineFeature { number, kind, shape: LineShape::Area(kept) });
+            self.features.push(LineFeature { number, name: None, kind, shape: LineShape::Area(kept) });
         }
         Ok(())
+    }
+
+    /// Checks that the ring of an area that points are kept in ends where it begins. Where it does not, a part may be missing.
+    fn check_closed(&self, number: u64, ring: &[[f64; 3]]) -> Result<()> {
+        let ends = ring.first().zip(ring.last()).filter(|(first, last)| first[..2] != last[..2]);
+        match ends.filter(|_| self.options.purpose == LinePurpose::Clip) {
+            Some(([x, y, _], [to_x, to_y, _])) => Err(self.refuse(
+                number,
+                format!(
+                    "has a ring that is not closed: it begins at ({x}, {y}) and ends at ({to_x}, {to_y}). Close it (in QGIS: \"Fix \
+                     geometries\")"
+                ),
+            )),
+            None => Ok(()),
+        }
     }
 
     /// Removes repeated holes of a lake, and notes what is wrong with its outlines.
@@ -443,14 +473,18 @@ mod tests {
 
     #[test]
     fn attributes_say_kind_and_height() {
-        let with = |kind: &str, height: Attribute| WantedAttributes { kind: Attribute::Text(kind.into()), height };
+        let with = |kind: &str, height: Attribute| WantedAttributes {
+            kind: Attribute::Text(kind.into()),
+            height,
+            ..WantedAttributes::NONE
+        };
         let (features, _) = collect("kind_field = \"T\"", line(1.0), with(" River ", Attribute::Missing)).unwrap();
         assert_eq!(features[0].kind, FeatureKind::River);
         let error =
             collect("kind_field = \"T\"", line(1.0), with("creek", Attribute::Missing)).unwrap_err().to_string();
         assert!(error.contains("\"creek\"") && error.contains("kinds"), "{error}");
         let table = "kind_field = \"T\"\nkinds = { \"46006\" = \"river\" }";
-        let number = WantedAttributes { kind: Attribute::Number(46006.0), height: Attribute::Missing };
+        let number = WantedAttributes { kind: Attribute::Number(46006.0), ..WantedAttributes::NONE };
         assert_eq!(collect(table, line(1.0), number).unwrap().0[0].kind, FeatureKind::River);
         let (features, warnings) = collect(table, line(1.0), with("7", Attribute::Missing)).unwrap();
         assert!(features.is_empty() && warnings.iter().any(|warning| warning.contains("kind_field")));

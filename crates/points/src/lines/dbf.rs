@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-use crate::lines::attribute::{Attribute, WantedAttributes, no_attribute};
+use crate::lines::attribute::{Attribute, NAME_FIELD, WantedAttributes, no_attribute};
 use crate::lines::encoding::Encoding;
 use sys::{Error, Result};
 
@@ -21,6 +21,7 @@ pub(super) struct DbfTable {
     encoding: Encoding,
     kind: Option<DbfField>,
     height: Option<DbfField>,
+    name: Option<DbfField>,
 }
 
 /// A column.
@@ -39,7 +40,13 @@ impl DbfTable {
     ///
     /// # Errors
     /// `Io` if it cannot be read, `Input` if it is no such table or lacks one of the attributes.
-    pub(super) fn open(path: &Path, encoding: Encoding, kind: Option<&str>, height: Option<&str>) -> Result<DbfTable> {
+    pub(super) fn open(
+        path: &Path,
+        encoding: Encoding,
+        kind: Option<&str>,
+        height: Option<&str>,
+        is_named: bool,
+    ) -> Result<DbfTable> {
         let failed = |error| Error::io("read", path)(error);
         let mut file = BufReader::new(File::open(path).map_err(failed)?);
         let mut header = vec![0; HEADER];
@@ -63,7 +70,8 @@ impl DbfTable {
             },
         };
         let (kind, height) = (find(kind)?, find(height)?);
-        Ok(DbfTable { path: path.to_path_buf(), file, record: vec![0; record], encoding, kind, height })
+        let name = fields.iter().find(|field| is_named && field.name.eq_ignore_ascii_case(NAME_FIELD)).cloned();
+        Ok(DbfTable { path: path.to_path_buf(), file, record: vec![0; record], encoding, kind, height, name })
     }
 
     /// Returns the wanted attributes of the next record, or what is wrong with it, without its subject.
@@ -78,7 +86,9 @@ impl DbfTable {
         let value = |field: &Option<DbfField>| {
             field.as_ref().map_or(Ok(Attribute::Missing), |field| field.value(&self.record, &self.encoding))
         };
-        let wanted = || Ok(WantedAttributes { kind: value(&self.kind)?, height: value(&self.height)? });
+        let wanted = || {
+            Ok(WantedAttributes { kind: value(&self.kind)?, height: value(&self.height)?, name: value(&self.name)? })
+        };
         Ok(wanted())
     }
 }
@@ -172,13 +182,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.dbf");
         std::fs::write(&path, bytes).unwrap();
-        DbfTable::open(&path, Encoding::of(None), Some(kind), Some(height))
+        DbfTable::open(&path, Encoding::of(None), Some(kind), Some(height), false)
     }
 
     #[test]
     fn texts_and_numbers_are_read() {
         let mut dbf = read(&table(&[("river", "12.5"), ("", "*****")]), "kind", "Z").unwrap();
-        let first = WantedAttributes { kind: Attribute::Text("river".into()), height: Attribute::Number(12.5) };
+        let first = WantedAttributes {
+            kind: Attribute::Text("river".into()),
+            height: Attribute::Number(12.5),
+            ..WantedAttributes::NONE
+        };
         assert_eq!(dbf.next_record().unwrap(), Ok(first));
         assert_eq!(dbf.next_record().unwrap(), Ok(WantedAttributes::NONE));
         assert!(dbf.next_record().unwrap().unwrap_err().contains("no record"));

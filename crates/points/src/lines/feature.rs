@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::lines::options::LinePurpose;
 use breaklines::FeatureKind;
 use crs::system::Crs;
 use sys::Warnings;
@@ -13,6 +14,8 @@ pub struct LineFile {
     pub path: PathBuf,
     /// The coordinate reference system that the file says.
     pub crs: Crs,
+    /// What it is read for.
+    pub purpose: LinePurpose,
     /// By what its heights have been multiplied to be in the unit of the points' heights.
     pub height_scale: f64,
     /// Its features, in their order.
@@ -27,6 +30,8 @@ pub struct LineFeature {
     /// Its number in the file: the record of a Shapefile and the feature of GeoJSON, both from 1 on, or the key in a GeoPackage (the
     /// place of the row where keys are no numbers). The parts of a feature with several share it.
     pub number: u64,
+    /// The value of its attribute "name", if the options ask for it and it has one.
+    pub name: Option<String>,
     /// What it is.
     pub kind: FeatureKind,
     /// Where it is.

@@ -7,12 +7,12 @@ use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 use serde_json::value::RawValue;
 
-use crate::lines::attribute::{Attribute, WantedAttributes, no_attribute};
+use crate::lines::attribute::{Attribute, NAME_FIELD, WantedAttributes, no_attribute};
 use crate::lines::collector::FeatureCollector;
 use crate::lines::feature::RawGeometry;
 use crate::lines::geojson_geometry::geometry;
 use crate::lines::geojson_properties::properties;
-use crate::lines::options::LineOptions;
+use crate::lines::options::{LineOptions, LinePurpose};
 use crs::crs_name::CrsName;
 use crs::from_wkt::from_epsg;
 use crs::system::Crs;
@@ -76,7 +76,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: 
         _ if text.starts_with(&[RECORD_SEPARATOR]) => return read_sequence(path, text, options, collector),
         _ => serde_json::from_slice(text).map_err(broken)?,
     };
-    let crs = if options.crs.is_read() { document_crs(path, document.crs)? } else { Crs::default() };
+    let crs = if options.crs.is_read() { document_crs(path, document.crs, options.purpose)? } else { Crs::default() };
     match document.kind.as_str() {
         "FeatureCollection" => {
             for (number, feature) in (1..).zip(document.features.unwrap_or_default()) {
@@ -95,7 +95,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: 
         }
     }
     if options.crs.is_read() && document.crs.is_none() {
-        refuse_metres(collector)?;
+        refuse_metres(path, options.purpose, collector)?;
     }
     Ok(crs)
 }
@@ -157,27 +157,38 @@ fn read_sequence(path: &Path, text: &[u8], options: &LineOptions, collector: &mu
         return Ok(Crs::default());
     }
     if first_crs.is_none() {
-        refuse_metres(collector)?;
+        refuse_metres(path, options.purpose, collector)?;
     }
-    document_crs(path, first_crs)
+    document_crs(path, first_crs, options.purpose)
 }
 
 /// Refuses coordinates that are no longitude and latitude, where nothing says what they are.
-fn refuse_metres(collector: &FeatureCollector) -> Result<()> {
+fn refuse_metres(path: &Path, purpose: LinePurpose, collector: &FeatureCollector) -> Result<()> {
     let is_beyond = |[x, y, _]: &&[f64; 3]| x.abs() > FARTHEST[0] || y.abs() > FARTHEST[1];
     match collector.find_vertex(is_beyond) {
         None => Ok(()),
-        Some((number, [x, y, _])) => Err(collector.refuse(
-            number,
-            format!(
-                "has a vertex at ({x}, {y}), and the file says no CRS: set crs in [[breaklines]] to that of its coordinates, such as crs = \
-                 \"points\" for the CRS of the points. GeoJSON without the member crs is in degrees on WGS 84, which these are not"
-            ),
-        )),
+        Some((number, [x, y, _])) => {
+            let remedy = match purpose {
+                LinePurpose::Breaklines => {
+                    "and the file says no CRS: set crs in [[breaklines]] to that of its coordinates, such as crs = \
+                                            \"points\" for the CRS of the points"
+                        .into()
+                }
+                LinePurpose::Clip | LinePurpose::Places => {
+                    format!("and the file says no CRS: {}", purpose.remedy_of_crs(path))
+                }
+            };
+            Err(collector.refuse(
+                number,
+                format!(
+                    "has a vertex at ({x}, {y}), {remedy}. GeoJSON without the member crs is in degrees on WGS 84, which these are not"
+                ),
+            ))
+        }
     }
 }
 
-fn document_crs(path: &Path, member: Option<&RawValue>) -> Result<Crs> {
+fn document_crs(path: &Path, member: Option<&RawValue>, purpose: LinePurpose) -> Result<Crs> {
     let Some(text) = member.map(RawValue::get) else { return Ok(from_epsg(WGS_84).unwrap_or_default()) };
     if text == "null" {
         return Ok(Crs::default());
@@ -185,9 +196,7 @@ fn document_crs(path: &Path, member: Option<&RawValue>) -> Result<Crs> {
     let value = Some(text).filter(|text| text.len() <= LONGEST_CRS).and_then(|text| serde_json::from_str(text).ok());
     value.as_ref().and_then(named_crs).ok_or_else(|| {
         let start: String = text.chars().take(200).collect();
-        let what = format!(
-            "its member crs says {start}, which is not known: say with crs in [[breaklines]] what the lines are in"
-        );
+        let what = format!("its member crs says {start}, which is not known: {}", purpose.remedy_of_crs(path));
         Error::input(path, what)
     })
 }
@@ -202,20 +211,25 @@ fn add(
     let unreadable = |error: serde_json::Error| {
         Error::input(path, format!("feature {number} cannot be read: {}", without_place(&error)))
     };
-    let wanted = [options.kind_field.as_deref(), options.height_field.as_deref()];
+    let wanted = [
+        options.kind_field.as_deref(),
+        options.height_field.as_deref(),
+        options.purpose.has_names().then_some(NAME_FIELD),
+    ];
     let wanted = match wanted {
-        [None, None] => WantedAttributes::NONE,
+        [None, None, None] => WantedAttributes::NONE,
         _ => {
             let text = feature.properties.unwrap_or(RawValue::NULL);
             let found = properties(text, wanted).map_err(unreadable)?;
-            // Where most have the attribute, a misspelt name must not look like features without a value.
-            let missing = wanted.iter().zip(&found.values).find_map(|(name, value)| name.filter(|_| value.is_none()));
+            // Where most have the attribute, a misspelt name must not look like features without a value. A name may be missing.
+            let missing =
+                wanted.iter().zip(&found.values).take(2).find_map(|(name, value)| name.filter(|_| value.is_none()));
             if let Some(name) = missing {
                 let what = no_attribute(name, &found.names);
                 return Err(Error::input(path, format!("feature {number}: it {what}")));
             }
-            let [kind, height] = found.values.map(|value| value.unwrap_or(Attribute::Missing));
-            WantedAttributes { kind, height }
+            let [kind, height, name] = found.values.map(|value| value.unwrap_or(Attribute::Missing));
+            WantedAttributes { kind, height, name }
         }
     };
     let shape = match feature.geometry {

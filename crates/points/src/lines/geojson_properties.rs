@@ -17,7 +17,7 @@ const LONGEST_VALUE: usize = 1 << 16;
 /// What is wanted of the properties.
 pub(super) struct Properties {
     /// The value of each wanted name; `None` if there is no such property.
-    pub(super) values: [Option<Attribute>; 2],
+    pub(super) values: [Option<Attribute>; 3],
     /// The names of the first properties.
     pub(super) names: Vec<String>,
 }
@@ -26,8 +26,8 @@ pub(super) struct Properties {
 ///
 /// # Errors
 /// If it is no object.
-pub(super) fn properties(text: &RawValue, wanted: [Option<&str>; 2]) -> serde_json::Result<Properties> {
-    let empty = Properties { values: [None, None], names: Vec::new() };
+pub(super) fn properties(text: &RawValue, wanted: [Option<&str>; 3]) -> serde_json::Result<Properties> {
+    let empty = Properties { values: [None, None, None], names: Vec::new() };
     match text.get() {
         "null" => Ok(empty),
         text => serde_json::Deserializer::from_str(text).deserialize_map(PropertiesVisitor { wanted, found: empty }),
@@ -35,7 +35,7 @@ pub(super) fn properties(text: &RawValue, wanted: [Option<&str>; 2]) -> serde_js
 }
 
 struct PropertiesVisitor<'a> {
-    wanted: [Option<&'a str>; 2],
+    wanted: [Option<&'a str>; 3],
     found: Properties,
 }
 
@@ -85,11 +85,11 @@ mod tests {
     fn the_wanted_ones_are_found() {
         let text = r#"{"b": [[1, 2], {"a": 7}], "Z": 4.5, "a": null, "T": "a \"river\""}"#;
         let read = |wanted| properties(serde_json::from_str(text).unwrap(), wanted).unwrap();
-        let found = read([Some("T"), Some("Z")]);
-        assert_eq!(found.values, [Some(Attribute::Text("a \"river\"".into())), Some(Attribute::Number(4.5))]);
+        let found = read([Some("T"), Some("Z"), None]);
+        assert_eq!(found.values, [Some(Attribute::Text("a \"river\"".into())), Some(Attribute::Number(4.5)), None]);
         assert_eq!(found.names, ["b", "Z", "a", "T"]);
-        assert_eq!(read([Some("Z"), Some("Z")]).values[0], Some(Attribute::Number(4.5)));
-        assert_eq!(read([Some("a"), Some("t")]).values, [Some(Attribute::Missing), None]);
-        assert!(properties(serde_json::from_str("[1]").unwrap(), [None, None]).is_err());
+        assert_eq!(read([Some("Z"), Some("Z"), None]).values[0], Some(Attribute::Number(4.5)));
+        assert_eq!(read([Some("a"), Some("t"), None]).values, [Some(Attribute::Missing), None, None]);
+        assert!(properties(serde_json::from_str("[1]").unwrap(), [None; 3]).is_err());
     }
 }

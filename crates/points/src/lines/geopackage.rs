@@ -8,12 +8,12 @@ use std::sync::{Mutex, PoisonError};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OptionalExtension, Row};
 
-use crate::lines::attribute::{Attribute, WantedAttributes, no_attribute};
+use crate::lines::attribute::{Attribute, NAME_FIELD, WantedAttributes, no_attribute};
 use crate::lines::collector::FeatureCollector;
 use crate::lines::feature::RawGeometry;
 use crate::lines::guarded_sqlite;
 use crate::lines::guarded_sqlite::{Column, TableName};
-use crate::lines::options::LineOptions;
+use crate::lines::options::{LineOptions, LinePurpose};
 use crate::lines::wkb;
 use crs::from_wkt::{from_epsg, parse};
 use crs::system::Crs;
@@ -70,10 +70,10 @@ pub(super) fn read(
         }
         add(row, layer.key.is_none().then_some(place), collector).map_err(broken)??;
     }
-    if options.crs.is_read() { crs(path, &file, layer.srs) } else { Ok(Crs::default()) }
+    if options.crs.is_read() { crs(path, &file, layer.srs, options.purpose) } else { Ok(Crs::default()) }
 }
 
-/// Returns the query for the number, the geometry, the kind and the height of all features.
+/// Returns the query for the number, the geometry, the kind, the height and the name of all features.
 fn query_of(path: &Path, file: &Connection, layer: &Layer, options: &LineOptions) -> Result<String> {
     for name in options.kind_field.iter().chain(&options.height_field) {
         if layer.column(name).is_none() {
@@ -94,10 +94,11 @@ fn query_of(path: &Path, file: &Connection, layer: &Layer, options: &LineOptions
         }
     };
     Ok(format!(
-        "SELECT {number}, {}, {}, {} FROM {}{order}",
+        "SELECT {number}, {}, {}, {}, {} FROM {}{order}",
         quoted(&layer.geometry),
         wanted(&options.kind_field),
         wanted(&options.height_field),
+        wanted(&options.purpose.has_names().then(|| NAME_FIELD.into())),
         quoted(&layer.table)
     ))
 }
@@ -155,12 +156,22 @@ fn find_layer(path: &Path, file: &Connection, tables: &[TableName], options: &Li
         (None, _, None) if layers.is_empty() => {
             return Err(Error::input(path, "is a database without a layer of features"));
         }
-        _ => return Err(Error::input(path, format!("has several layers: name one of them with layer: {names}"))),
+        _ => {
+            let what = match options.purpose {
+                LinePurpose::Breaklines => "has several layers: name one of them with layer".to_string(),
+                LinePurpose::Clip | LinePurpose::Places => format!(
+                    "has several layers: write one of them alone, with `ogr2ogr area.gpkg {} LAYER`",
+                    path.display()
+                ),
+            };
+            return Err(Error::input(path, format!("{what}: {names}")));
+        }
     };
     let is_named = |column: &Column, name: &String| column.name.eq_ignore_ascii_case(name);
     let is_read = |column: &Column| {
         let mut names = [&geometry].into_iter().chain(&options.kind_field).chain(&options.height_field);
-        column.is_key || names.any(|name| is_named(column, name))
+        let is_name = options.purpose.has_names() && column.name.eq_ignore_ascii_case(NAME_FIELD);
+        column.is_key || is_name || names.any(|name| is_named(column, name))
     };
     let columns = plain_columns(path, file, &table, is_read)?;
     let is_view = find_table(tables, &table).is_some_and(|table| table.is_view);
@@ -221,7 +232,7 @@ impl Layer {
     }
 }
 
-/// Adds a row: its key, or the `place` that numbers it, its geometry, kind and height. The outer result is SQLite's.
+/// Adds a row: its key, or the `place` that numbers it, its geometry, kind, height and name. The outer result is SQLite's.
 fn add(row: &Row, place: Option<u64>, collector: &mut FeatureCollector) -> rusqlite::Result<Result<()>> {
     let number = place.unwrap_or(u64::try_from(row.get::<_, i64>(0)?).unwrap_or(0));
     let geometry = match row.get_ref(1)? {
@@ -229,7 +240,11 @@ fn add(row: &Row, place: Option<u64>, collector: &mut FeatureCollector) -> rusql
         ValueRef::Blob(bytes) => geometry(bytes),
         _ => Err("has a geometry that is none: it is no blob".into()),
     };
-    let wanted = WantedAttributes { kind: attribute(row.get_ref(2)?), height: attribute(row.get_ref(3)?) };
+    let wanted = WantedAttributes {
+        kind: attribute(row.get_ref(2)?),
+        height: attribute(row.get_ref(3)?),
+        name: attribute(row.get_ref(4)?),
+    };
     let geometry = geometry.map_err(|what: String| collector.refuse(number, what));
     Ok(geometry.and_then(|geometry| collector.add(number, geometry, &wanted)))
 }
@@ -261,7 +276,7 @@ fn geometry(blob: &[u8]) -> std::result::Result<RawGeometry, String> {
     }
 }
 
-fn crs(path: &Path, file: &Connection, srs: i64) -> Result<Crs> {
+fn crs(path: &Path, file: &Connection, srs: i64, purpose: LinePurpose) -> Result<Crs> {
     let broken = |error: rusqlite::Error| Error::input(path, format!("its table of CRSs cannot be read: {error}"));
     plain_columns(path, file, "gpkg_spatial_ref_sys", |_| true)?;
     // Negative numbers and 0 say that the CRS is not known.
@@ -274,7 +289,7 @@ fn crs(path: &Path, file: &Connection, srs: i64) -> Result<Crs> {
     let Some((organization, code, text)) = found else {
         return Err(Error::input(
             path,
-            format!("its CRS {srs} is not in its table of CRSs: say with crs in [[breaklines]] what it is"),
+            format!("its CRS {srs} is not in its table of CRSs: {}", purpose.remedy_of_crs(path)),
         ));
     };
     let code = u32::try_from(code).ok().filter(|_| organization.eq_ignore_ascii_case("EPSG"));

@@ -14,6 +14,7 @@ mod geojson_properties;
 mod geopackage;
 mod guarded_sqlite;
 mod lake_rings;
+pub mod line_crs;
 mod open;
 pub mod options;
 mod polygons;

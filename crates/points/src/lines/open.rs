@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::file::random_access::RandomAccessFile;
 use crate::lines::collector::FeatureCollector;
 use crate::lines::feature::LineFile;
-use crate::lines::options::LineOptions;
+use crate::lines::options::{LineOptions, LinePurpose};
 use crate::lines::{geojson, geopackage, shapefile};
 use sys::{Error, Result, Warnings};
 
@@ -44,18 +44,18 @@ pub fn read_lines(path: &Path, options: &LineOptions, memory: u64) -> Result<Lin
         [0, 0, 0x27, 0x0a, ..] => shapefile::read(path, &bytes(&file)?, options, &mut collector, &mut warnings)?,
         b"SQLite format 3\0" => geopackage::read(path, file.size(), memory, options, &mut collector)?,
         start if is_json(&start[..held]) => geojson::read(path, &bytes(&file)?, options, &mut collector)?,
-        _ => return Err(Error::input(path, other_format(path, held))),
+        _ => return Err(Error::input(path, other_format(path, held, options.purpose))),
     };
     let (features, left_out) = collector.finish();
     warnings.extend(left_out);
-    Ok(LineFile { path: path.to_path_buf(), crs, height_scale: 1.0, features, warnings })
+    Ok(LineFile { path: path.to_path_buf(), crs, purpose: options.purpose, height_scale: 1.0, features, warnings })
 }
 
 fn is_json(start: &[u8]) -> bool {
     geojson::is_json(start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start))
 }
 
-fn other_format(path: &Path, held: usize) -> String {
+fn other_format(path: &Path, held: usize, purpose: LinePurpose) -> String {
     if held == 0 {
         return "is empty".into();
     }
@@ -64,7 +64,7 @@ fn other_format(path: &Path, held: usize) -> String {
         true => (IN_GDB, path.parent().unwrap_or(path)),
         false => (OTHER_FORMAT, path),
     };
-    what.replace("FILE", &named.display().to_string())
+    what.replace("lines", purpose.features()).replace("FILE", &named.display().to_string())
 }
 
 /// What to say about a file in the folder of a FileGDB.

@@ -1,6 +1,7 @@
 //! The options of `[[breaklines]]`.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
@@ -42,9 +43,87 @@ pub struct LineOptions {
     /// The coordinate reference system of these files.
     #[serde(default)]
     pub crs: LineCrs,
+    /// What the files are read for.
+    #[serde(skip)]
+    pub purpose: LinePurpose,
+}
+
+/// What files of lines and polygons are read for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LinePurpose {
+    /// The edges of `[[breaklines]]`.
+    #[default]
+    Breaklines,
+    /// The area of `[input] clip`. Only polygons are read, and no heights.
+    Clip,
+    /// Places on a written terrain, which a command lists with their names.
+    Places,
+}
+
+impl LinePurpose {
+    /// Tells whether the names of features are read.
+    pub(crate) fn has_names(self) -> bool {
+        self == LinePurpose::Places
+    }
+
+    /// Returns what messages call the features.
+    pub fn features(self) -> &'static str {
+        match self {
+            LinePurpose::Breaklines => "lines",
+            LinePurpose::Clip => "polygons",
+            LinePurpose::Places => "features",
+        }
+    }
+
+    /// Returns what to do about the file at `path` if it states no CRS that can be used.
+    pub fn remedy_of_crs(self, path: &Path) -> String {
+        match self {
+            LinePurpose::Breaklines => "say with crs in [[breaklines]] what the lines are in".into(),
+            LinePurpose::Clip | LinePurpose::Places => {
+                format!(
+                    "write the right one into it, for example with `ogr2ogr -a_srs EPSG:26915 corrected.gpkg {}`",
+                    path.display()
+                )
+            }
+        }
+    }
 }
 
 impl LineOptions {
+    /// Returns the options of the file at `path` whose polygons are the area of a job.
+    pub fn of_clip(path: &Path) -> LineOptions {
+        LineOptions {
+            files: vec![path.to_string_lossy().into_owned()],
+            kind: None,
+            kind_field: None,
+            kinds: None,
+            spacing: LineSpacing::default(),
+            heights: LineHeights::Points,
+            height_field: None,
+            height_unit: UnitChoice::default(),
+            layer: None,
+            crs: LineCrs::default(),
+            purpose: LinePurpose::Clip,
+        }
+    }
+
+    /// Returns the options for a file whose lines and areas are used as they are, without their heights, but with their names.
+    pub fn of_named_places(path: &Path) -> LineOptions {
+        LineOptions {
+            files: vec![path.display().to_string()],
+            kind: None,
+            kind_field: None,
+            kinds: None,
+            spacing: LineSpacing::Auto,
+            heights: LineHeights::Points,
+            height_field: None,
+            height_unit: UnitChoice::Auto,
+            layer: None,
+            crs: LineCrs::Auto,
+            purpose: LinePurpose::Places,
+        }
+    }
+
     /// Returns a sentence about options that contradict each other, or that say nothing.
     pub fn contradiction(&self) -> Option<&'static str> {
         if self.files.is_empty() {

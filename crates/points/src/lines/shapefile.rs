@@ -13,7 +13,7 @@ use crate::lines::collector::FeatureCollector;
 use crate::lines::dbf::DbfTable;
 use crate::lines::encoding::Encoding;
 use crate::lines::feature::RawGeometry;
-use crate::lines::options::LineOptions;
+use crate::lines::options::{LineOptions, LinePurpose};
 use crate::lines::polygons::areas_of;
 use crs::from_wkt::parse;
 use crs::system::Crs;
@@ -61,7 +61,7 @@ pub(super) fn read(
         collector.add(number, geometry, &wanted)?;
         rest = after;
     }
-    if options.crs.is_read() { crs(path, warnings) } else { Ok(Crs::default()) }
+    if options.crs.is_read() { crs(path, options.purpose, warnings) } else { Ok(Crs::default()) }
 }
 
 /// Returns the bytes of all records, as far as the header says.
@@ -126,13 +126,16 @@ fn parts(record: &[u8], has_z: bool) -> Option<Vec<Vec<[f64; 3]>>> {
 }
 
 fn attributes(path: &Path, options: &LineOptions) -> Result<Option<DbfTable>> {
-    if options.kind_field.is_none() && options.height_field.is_none() {
+    let is_needed = options.kind_field.is_some() || options.height_field.is_some();
+    if !is_needed && !options.purpose.has_names() {
         return Ok(None);
     }
     match beside(path, "dbf") {
+        None if !is_needed => Ok(None),
         Some(dbf) => {
             let encoding = Encoding::of(beside(path, "cpg").as_deref());
-            DbfTable::open(&dbf, encoding, options.kind_field.as_deref(), options.height_field.as_deref()).map(Some)
+            let (kind, height) = (options.kind_field.as_deref(), options.height_field.as_deref());
+            DbfTable::open(&dbf, encoding, kind, height, options.purpose.has_names()).map(Some)
         }
         None => Err(Error::input(
             path,
@@ -142,20 +145,20 @@ fn attributes(path: &Path, options: &LineOptions) -> Result<Option<DbfTable>> {
     }
 }
 
-fn crs(path: &Path, warnings: &mut Warnings) -> Result<Crs> {
+fn crs(path: &Path, purpose: LinePurpose, warnings: &mut Warnings) -> Result<Crs> {
     let Some(prj) = beside(path, "prj") else {
-        warnings.push(
-            "there is no .prj file beside it, so it says no CRS: its lines are taken to be in that of the points",
-        );
+        warnings.push(format!(
+            "there is no .prj file beside it, so it says no CRS: its {} are taken to be in that of the points",
+            purpose.features()
+        ));
         return Ok(Crs::default());
     };
     let mut text = Vec::new();
     let file = File::open(&prj).map_err(Error::io("read", &prj))?;
     file.take(LONGEST_PRJ).read_to_end(&mut text).map_err(Error::io("read", &prj))?;
     let text = String::from_utf8_lossy(&text);
-    parse(text.trim_start_matches('\u{feff}').trim()).ok_or_else(|| {
-        Error::input(&prj, "is no well-known text of a CRS: say with crs in [[breaklines]] what the lines are in")
-    })
+    parse(text.trim_start_matches('\u{feff}').trim())
+        .ok_or_else(|| Error::input(&prj, format!("is no well-known text of a CRS: {}", purpose.remedy_of_crs(path))))
 }
 
 /// Returns the files that are read with the `.shp` at `path`: itself, its attributes, its CRS, and how its texts are written.

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 pub(crate) const MOST_EXAMPLES: usize = 5;
 
 /// What happened to the records of a source, or of a part of it:
-/// `read = out_of_bounds + withheld + other_class + other_return + nodata + malformed + at_breaklines +
+/// `read = out_of_bounds + outside_clip + withheld + other_class + other_return + nodata + malformed + at_breaklines +
 /// kept`. The first reason that applies counts, in the order
-/// out of bounds, withheld, class, return, nodata, lattice. So the numbers do not depend on whether an index tells what is out of bounds.
+/// out of bounds, outside the polygons, withheld, class, return, nodata, lattice. So the numbers do not depend on whether an index tells what is out of bounds.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PointCounts {
     /// Records seen, including the records missing from a truncated file.
@@ -23,9 +23,12 @@ pub struct PointCounts {
     /// Dropped: of a return that the job does not want.
     #[serde(default)]
     pub other_return: u64,
-    /// Dropped: outside the job's bounds, or its heights.
+    /// Dropped: outside the job's bounds, or the box of the polygons of its clip, or its heights.
     pub out_of_bounds: u64,
-    /// Those of them that were not even decoded, because the index of the file says where they lie.
+    /// Dropped: within all these, but outside the polygons of the clip.
+    #[serde(default)]
+    pub outside_clip: u64,
+    /// Those out of bounds that were not even decoded, because the index or the header of the file says where they lie.
     #[serde(default)]
     pub not_decoded: u64,
     /// Dropped: their height stands for nodata.
@@ -99,6 +102,7 @@ impl AddAssign for PointCounts {
         self.other_class += other.other_class;
         self.other_return += other.other_return;
         self.out_of_bounds += other.out_of_bounds;
+        self.outside_clip += other.outside_clip;
         self.not_decoded += other.not_decoded;
         self.nodata += other.nodata;
         self.malformed += other.malformed;

@@ -101,9 +101,19 @@ impl<'a> PointFilter<'a> {
             self.counts.ground += if is_ground(class) { kept } else { 0 };
             self.counts.unclassified += if is_unclassified(class) { kept } else { 0 };
         }
-        let PointCounts { withheld, other_class, other_return, out_of_bounds, nodata, malformed, kept, .. } =
-            self.counts;
-        self.counts.read = withheld + other_class + other_return + out_of_bounds + nodata + malformed + kept;
+        let PointCounts {
+            withheld,
+            other_class,
+            other_return,
+            out_of_bounds,
+            outside_clip,
+            nodata,
+            malformed,
+            kept,
+            ..
+        } = self.counts;
+        let not_wanted = out_of_bounds + outside_clip + withheld + other_class + other_return;
+        self.counts.read = not_wanted + nodata + malformed + kept;
         let classes: BTreeMap<u8, u64> = (0..=u8::MAX).zip(self.classes).filter(|(_, count)| *count > 0).collect();
         self.counts.classes = classes;
         Ok(self.counts)
@@ -126,6 +136,10 @@ impl<'a> PointFilter<'a> {
     fn push_any(&mut self, number: u64, record: &PointRecord, place: impl Fn() -> String) -> Result<()> {
         if self.rules.bounds.as_ref().is_some_and(|bounds| !bounds.hold(&record.raw)) {
             self.counts.out_of_bounds += 1;
+            return Ok(());
+        }
+        if self.is_outside_clip(record) {
+            self.counts.outside_clip += 1;
             return Ok(());
         }
         if record.withheld {
@@ -163,6 +177,19 @@ impl<'a> PointFilter<'a> {
                 });
                 Ok(())
             }
+        }
+    }
+
+    /// Returns whether a record lies outside the polygons of the job. Unlike bounds, which hold for the numbers of a file, this is decided
+    /// on the lattice: the polygons come from another file, often from another system, so they are exact nowhere else. So points that
+    /// rounding brings to one place fare alike, whatever their files. A record without a place on the lattice is malformed.
+    #[inline]
+    fn is_outside_clip(&self, record: &PointRecord) -> bool {
+        let Some(clip) = &self.rules.clip else { return false };
+        let [x, y, _] = &self.rules.maps;
+        match (x.apply(record.raw[0]), y.apply(record.raw[1])) {
+            (Some((x, _)), Some((y, _))) => !clip.holds([x, y]),
+            _ => false,
         }
     }
 
@@ -242,9 +269,9 @@ impl RecordSink for PointFilter<'_> {
     }
 }
 
-/// Returns the maps of x, y and z if all are exact, and neither bounds nor returns leave records out.
+/// Returns the maps of x, y and z if all are exact, and neither bounds nor polygons nor returns leave records out.
 fn quick_maps(rules: &PointRules) -> Option<[[i64; 2]; 3]> {
-    let asks_for_more = rules.bounds.is_some() || rules.returns != KeptReturns::All;
+    let asks_for_more = rules.bounds.is_some() || rules.clip.is_some() || rules.returns != KeptReturns::All;
     let [x, y, z] = &rules.maps;
     if asks_for_more { None } else { Some([x.exact()?, y.exact()?, z.exact()?]) }
 }
@@ -260,9 +287,10 @@ mod tests {
     use crate::points::classes::is_noise;
     use crate::points::optional_fields::OptionalFields;
     use crate::points::raw_bounds::RawBounds;
-    use lattice::AxisMap;
+    use lattice::{AxisMap, LatticeArea};
     use proptest::prelude::*;
     use rust_decimal::Decimal;
+    use std::sync::Arc;
 
     fn map(offset: i64, scale: i64) -> AxisMap {
         AxisMap::new(Decimal::from(offset), Decimal::from(scale), Decimal::ZERO, Decimal::ONE).unwrap()
@@ -320,12 +348,41 @@ mod tests {
                 classes: std::array::from_fn(|class| !is_noise(class as u8)),
                 returns: KeptReturns::All,
                 bounds: None,
+                clip: None,
                 first_order,
                 numbered,
                 fields: OptionalFields::default(),
             };
             prop_assert_eq!(filtered(&rules, &records, false), filtered(&rules, &records, true));
         }
+    }
+
+    /// Of a finer source, several records come to one place of the lattice.
+    #[test]
+    fn polygons_hold_for_places_on_the_lattice() {
+        let rounding = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::from(10)).unwrap();
+        let area = LatticeArea::new(&[vec![vec![[0, 0], [10, 0], [10, 10], [0, 10]]]]);
+        let rules = PointRules {
+            maps: [rounding; 3],
+            classes: std::array::from_fn(|class| class != 9),
+            returns: KeptReturns::All,
+            bounds: None,
+            clip: Some(Arc::new(area)),
+            first_order: 0,
+            numbered: true,
+            fields: OptionalFields::default(),
+        };
+        let axes = [Axis { offset: Decimal::ZERO, scale: Decimal::ONE }; 3];
+        let mut ignore = |_: &[Point]| Ok(());
+        let mut filter = PointFilter::new(Path::new("cloud.las"), &axes, &rules, &mut ignore);
+        let records = [([-4, 0], 2), ([-6, 50], 2), ([104, 104], 2), ([105, 50], 9), ([50, 50], 9), ([50, 1 << 40], 2)];
+        for (number, ([x, y], class)) in (0..).zip(records) {
+            let record = PointRecord { raw: [x, y, 0], class, ..PointRecord::default() };
+            filter.push(number, &record, String::new).unwrap();
+        }
+        let counts = filter.finish().unwrap();
+        assert_eq!((counts.kept, counts.outside_clip, counts.other_class, counts.malformed), (2, 2, 1, 1));
+        assert_eq!((counts.read, counts.classes.get(&9)), (6, Some(&1)));
     }
 
     #[test]
@@ -335,6 +392,7 @@ mod tests {
             classes: [true; 256],
             returns: KeptReturns::All,
             bounds: None,
+            clip: None,
             first_order: 0,
             numbered: true,
             fields: OptionalFields::default(),
@@ -343,6 +401,8 @@ mod tests {
         assert_eq!(quick_maps(&PointRules { returns: KeptReturns::First, ..rules.clone() }), None);
         let everywhere = RawBounds { min: [i64::MIN; 2], max: [i64::MAX; 2] };
         assert_eq!(quick_maps(&PointRules { bounds: Some(everywhere), ..rules.clone() }), None);
+        let area = Arc::new(LatticeArea::new(&[vec![vec![[0, 0], [9, 0], [0, 9]]]]));
+        assert_eq!(quick_maps(&PointRules { clip: Some(area), ..rules.clone() }), None);
         let rounding = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::from(2)).unwrap();
         for axis in 0..3 {
             let mut changed = rules.clone();

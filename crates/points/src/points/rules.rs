@@ -1,11 +1,12 @@
 //! Which points a job keeps, and where they land on the lattice.
 
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 use crate::points::optional_fields::OptionalFields;
 use crate::points::raw_bounds::RawBounds;
 use crate::points::returns::KeptReturns;
-use lattice::AxisMap;
+use lattice::{AxisMap, LatticeArea};
 
 /// What decoding a source needs to know of the job.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -20,6 +21,9 @@ pub struct PointRules {
     pub returns: KeptReturns,
     /// Keep only points with raw integers within these bounds in x and y.
     pub bounds: Option<RawBounds>,
+    /// Keep only points within this area. All sources of a job share it, so the plan writes it down once for all.
+    #[serde(skip)]
+    pub clip: Option<Arc<LatticeArea>>,
     /// The number in the whole job of the source's first record.
     pub first_order: u64,
     /// Whether points keep their numbers in the job. Without them they take less room.

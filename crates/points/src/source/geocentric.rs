@@ -127,6 +127,7 @@ impl Source {
             classes: [true; 256],
             returns: KeptReturns::All,
             bounds: None,
+            clip: None,
             first_order: 0,
             numbered: false,
             fields: OptionalFields::default(),

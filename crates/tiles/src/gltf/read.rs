@@ -70,8 +70,16 @@ pub fn read_surface(path: &Path) -> Result<TileFile> {
     read(path, TileDocument::bare)
 }
 
+/// As [`read_surface`], for the `bytes` of the file at `path`.
+pub fn read_surface_of(path: &Path, bytes: Vec<u8>) -> Result<TileFile> {
+    decode(path, GlbFile::in_memory(path, bytes)?, TileDocument::bare)
+}
+
 fn read(path: &Path, wanted: impl FnOnce(TileDocument) -> TileDocument) -> Result<TileFile> {
-    let mut file = GlbFile::open(path)?;
+    decode(path, GlbFile::open(path)?, wanted)
+}
+
+fn decode(path: &Path, mut file: GlbFile, wanted: impl FnOnce(TileDocument) -> TileDocument) -> Result<TileFile> {
     let document = wanted(read_document(path, &file)?);
     let binary = file.binary(path)?;
     let mut decoder = Decoder { document: &document, binary: &binary, used: 0 };

@@ -1,10 +1,11 @@
-//! Packing a block: the predictor for floating-point numbers (Adobe, "TIFF Technical Note 3"), then DEFLATE.
+//! Packing a block: the predictor for floating-point numbers (Adobe, "TIFF Technical Note 3") or for bytes, then DEFLATE.
 //!
 //! The coder is `miniz_oxide` itself, not `flate2`, whose coder other crates of a build can exchange: the bytes of a file must not depend
 //! on that.
 
 use crate::raster::BLOCK;
 use crate::raster::options::RasterCompression;
+use crate::raster::products::RasterProduct;
 use miniz_oxide::deflate::core::{
     CompressionStrategy, CompressorOxide, TDEFLFlush, compress_to_output, create_comp_flags_from_zip_params,
 };
@@ -15,12 +16,29 @@ const LEVEL: i32 = 6;
 /// A header and a checksum around the data, as TIFF wants it.
 const WITH_HEADER: i32 = 15;
 
-/// Returns the bytes of a block of [`BLOCK`] rows and columns in a file.
-pub fn packed(cells: &[f32], compression: RasterCompression) -> Vec<u8> {
-    match compression {
-        RasterCompression::Deflate => deflated(&predicted(cells)),
-        RasterCompression::None => cells.iter().flat_map(|cell| cell.to_le_bytes()).collect(),
+/// Returns the bytes of a block of [`BLOCK`] rows and columns in a file of `product`. Cells of bytes are rounded to whole numbers.
+pub fn packed(cells: &[f32], product: RasterProduct, compression: RasterCompression) -> Vec<u8> {
+    match (compression, product.is_bytes()) {
+        (RasterCompression::Deflate, false) => deflated(&predicted(cells)),
+        (RasterCompression::None, false) => cells.iter().flat_map(|cell| cell.to_le_bytes()).collect(),
+        (RasterCompression::Deflate, true) => deflated(&differences(bytes(cells))),
+        (RasterCompression::None, true) => bytes(cells),
     }
+}
+
+fn bytes(cells: &[f32]) -> Vec<u8> {
+    // The conversion keeps within 0 and 255.
+    cells.iter().map(|cell| (cell + 0.5) as u8).collect()
+}
+
+/// Returns each byte of every row as the difference to the one before.
+fn differences(mut cells: Vec<u8>) -> Vec<u8> {
+    for row in cells.chunks_exact_mut(BLOCK) {
+        for at in (1..row.len()).rev() {
+            row[at] = row[at].wrapping_sub(row[at - 1]);
+        }
+    }
+    cells
 }
 
 /// Returns the bytes, packed. The coder looks for runs of one byte and for nothing else that repeats: the last bits of heights are as good
@@ -61,7 +79,7 @@ mod tests {
     #[test]
     fn a_packed_block_comes_back() {
         let cells: Vec<f32> = (0..BLOCK * BLOCK).map(|n| (n % 777) as f32 * 0.37 - 9.0).collect();
-        let bytes = packed(&cells, RasterCompression::Deflate);
+        let bytes = packed(&cells, RasterProduct::Height, RasterCompression::Deflate);
         assert!(bytes.len() < 2 * cells.len());
         let mut bytes = decompress_to_vec_zlib(&bytes).unwrap();
         let mut restored = Vec::new();
@@ -71,6 +89,15 @@ mod tests {
             restored.extend((0..BLOCK).map(cell));
         }
         assert_eq!(restored, cells);
-        assert_eq!(packed(&cells, RasterCompression::None)[4..8], cells[1].to_le_bytes());
+        let shades: Vec<f32> = cells.iter().map(|cell| (cell.abs() % 255.0).floor()).collect();
+        let plain = packed(&shades, RasterProduct::Hillshade, RasterCompression::None);
+        assert!(plain.iter().zip(&shades).all(|(byte, shade)| f32::from(*byte) == *shade));
+        let mut bytes =
+            decompress_to_vec_zlib(&packed(&shades, RasterProduct::Hillshade, RasterCompression::Deflate)).unwrap();
+        for row in bytes.chunks_exact_mut(BLOCK) {
+            (1..row.len()).for_each(|at| row[at] = row[at].wrapping_add(row[at - 1]));
+        }
+        assert_eq!(bytes, plain);
+        assert_eq!(packed(&cells, RasterProduct::Height, RasterCompression::None)[4..8], cells[1].to_le_bytes());
     }
 }

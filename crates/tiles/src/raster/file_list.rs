@@ -1,8 +1,9 @@
-//! `terrain.vrt`: the files of a raster, which GDAL and the programs that use it open as one (GDAL's virtual format).
+//! `terrain.vrt` and its like: the files of a raster, which GDAL and the programs that use it open as one (GDAL's virtual format).
 
 use crate::raster::BLOCK;
 use crate::raster::geokeys::RasterSystem;
-use crate::raster::options::Nodata;
+use crate::raster::options::nodata_text;
+use crate::raster::products::RasterProduct;
 use std::fmt;
 
 /// A file of a raster.
@@ -21,8 +22,10 @@ pub struct RasterList<'a> {
     pub corner: [f64; 2],
     /// The side of a cell in source units.
     pub cell_size: f64,
-    /// What cells without a height hold.
-    pub nodata: Nodata,
+    /// What the cells hold.
+    pub product: RasterProduct,
+    /// What cells without a value hold.
+    pub nodata: f32,
     /// What the coordinates are in.
     pub system: &'a RasterSystem,
     /// The files. There is none where there is no terrain.
@@ -38,22 +41,28 @@ impl fmt::Display for RasterList<'_> {
         }
         writeln!(f, "  <GeoTransform>{west}, {cell}, 0, {north}, 0, -{cell}</GeoTransform>")?;
         writeln!(f, r#"  <Metadata><MDI key="AREA_OR_POINT">Area</MDI></Metadata>"#)?;
-        writeln!(f, r#"  <VRTRasterBand dataType="Float32" band="1">"#)?;
-        writeln!(f, "    <NoDataValue>{}</NoDataValue>", self.nodata.text())?;
-        self.files.iter().try_for_each(|file| file.write(f))?;
+        writeln!(f, r#"  <VRTRasterBand dataType="{}" band="1">"#, self.data_type())?;
+        writeln!(f, "    <NoDataValue>{}</NoDataValue>", nodata_text(self.nodata))?;
+        self.files.iter().try_for_each(|file| file.write(self.data_type(), f))?;
         writeln!(f, "  </VRTRasterBand>\n</VRTDataset>")
     }
 }
 
+impl RasterList<'_> {
+    fn data_type(&self) -> &'static str {
+        if self.product.is_bytes() { "Byte" } else { "Float32" }
+    }
+}
+
 impl ListedFile {
-    fn write(&self, f: &mut fmt::Formatter) -> fmt::Result {
+    fn write(&self, data_type: &str, f: &mut fmt::Formatter) -> fmt::Result {
         let ([left, top], [width, height]) =
             (self.cells.map(|[first, _]| first), self.cells.map(|[first, past]| past - first));
         // With these properties, programs need not open all files to open the list.
         write!(
             f,
             "    <SimpleSource>\n      <SourceFilename relativeToVRT=\"1\">{}</SourceFilename>\n      <SourceBand>1</SourceBand>\n      \
-             <SourceProperties RasterXSize=\"{width}\" RasterYSize=\"{height}\" DataType=\"Float32\" BlockXSize=\"{BLOCK}\" \
+             <SourceProperties RasterXSize=\"{width}\" RasterYSize=\"{height}\" DataType=\"{data_type}\" BlockXSize=\"{BLOCK}\" \
              BlockYSize=\"{BLOCK}\"/>\n      <SrcRect xOff=\"0\" yOff=\"0\" xSize=\"{width}\" ySize=\"{height}\"/>\n      \
              <DstRect xOff=\"{left}\" yOff=\"{top}\" xSize=\"{width}\" ySize=\"{height}\"/>\n    </SimpleSource>\n",
             escaped(&self.uri)
@@ -86,7 +95,8 @@ mod tests {
             size: [1500, 700],
             corner: [500_000.5, 4_000_000.0],
             cell_size: 0.5,
-            nodata: Nodata::default(),
+            product: RasterProduct::Height,
+            nodata: -9999.0,
             system: &system,
             files: vec![ListedFile { uri: "raster/000002.tif".into(), cells: [[1024, 1500], [512, 700]] }],
         };

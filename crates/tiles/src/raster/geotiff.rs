@@ -6,7 +6,8 @@
 
 use crate::raster::BLOCK;
 use crate::raster::geokeys::{DOUBLES, RasterSystem, TEXTS};
-use crate::raster::options::{RasterCompression, RasterOptions};
+use crate::raster::options::{RasterCompression, RasterOptions, nodata_text};
+use crate::raster::products::RasterProduct;
 use crate::raster::tags::{TagValues, TiffKind, push_directory};
 
 /// What GDAL finds in front of the directories: a reader may count on it and fetch a block with its size at once.
@@ -24,6 +25,8 @@ pub const TRAILER: usize = 4;
 pub struct RasterHead<'a> {
     /// What the configuration asks for.
     pub options: RasterOptions,
+    /// What the cells hold.
+    pub product: RasterProduct,
     /// The x of the western and the y of the northern edge.
     pub corner: [f64; 2],
     /// The side of a cell, in units of x and y.
@@ -93,27 +96,34 @@ fn tags(head: &RasterHead, image: &RasterImage, offsets: &[u64], is_overview: bo
     use TagValues::{Double, Long, Offsets, Short, Text};
     const REDUCED: u32 = 1;
     const DEFLATE: u16 = 8;
+    const UNSIGNED: u16 = 1;
     const FLOATING_POINT: u16 = 3;
+    const DIFFERENCES: u16 = 2;
+    // The predictor for floating-point numbers has their number too.
+    let [format, predictor] = match head.product.is_bytes() {
+        true => [UNSIGNED, DIFFERENCES],
+        false => [FLOATING_POINT; 2],
+    };
     let is_packed = head.options.compression == RasterCompression::Deflate;
     let mut tags = vec![
         (254, Long(vec![if is_overview { REDUCED } else { 0 }])),
         (256, Long(vec![image.size[0]])),
         (257, Long(vec![image.size[1]])),
-        (258, Short(vec![32])),
+        (258, Short(vec![head.product.bits()])),
         (259, Short(vec![if is_packed { DEFLATE } else { 1 }])),
         (262, Short(vec![1])),
         (277, Short(vec![1])),
         (284, Short(vec![1])),
     ];
     if is_packed {
-        tags.push((317, Short(vec![FLOATING_POINT])));
+        tags.push((317, Short(vec![predictor])));
     }
     tags.extend([
         (322, Short(vec![BLOCK as u16])),
         (323, Short(vec![BLOCK as u16])),
         (324, Offsets(offsets.to_vec())),
         (325, Long(image.lengths.clone())),
-        (339, Short(vec![FLOATING_POINT])),
+        (339, Short(vec![format])),
     ]);
     if !is_overview {
         tags.extend(head.copyright.map(|text| (33432, Text(text.into()))));
@@ -124,7 +134,7 @@ fn tags(head: &RasterHead, image: &RasterImage, offsets: &[u64], is_overview: bo
         tags.extend((!keys.doubles.is_empty()).then_some((DOUBLES, Double(keys.doubles))));
         tags.extend((!keys.texts.is_empty()).then_some((TEXTS, Text(keys.texts))));
     }
-    tags.push((42113, Text(head.options.nodata.text())));
+    tags.push((42113, Text(nodata_text(head.product.nodata(head.options.nodata.number())))));
     tags
 }
 
@@ -156,9 +166,16 @@ mod tests {
         let system = RasterSystem { code: Some(26915), metres: Some(1.0), ..RasterSystem::default() };
         for compression in ["deflate", "none"] {
             let options = options(compression);
-            let (block, coarse) = (packed(&cells, options.compression), packed(&cells[..], options.compression));
-            let about =
-                RasterHead { options, corner: [100.0, 250.0], cell_size: 2.5, system: &system, copyright: None };
+            let packed = |cells: &[f32]| packed(cells, RasterProduct::Height, options.compression);
+            let (block, coarse) = (packed(&cells), packed(&cells[..]));
+            let about = RasterHead {
+                options,
+                product: RasterProduct::Height,
+                corner: [100.0, 250.0],
+                cell_size: 2.5,
+                system: &system,
+                copyright: None,
+            };
             let lengths = vec![block.len() as u32; 2];
             let images = [
                 RasterImage { size: [600, 512], lengths },
@@ -180,8 +197,14 @@ mod tests {
     #[test]
     fn a_file_of_more_than_four_gigabytes_has_longer_offsets() {
         let system = RasterSystem::default();
-        let about =
-            RasterHead { options: options("none"), corner: [0.0; 2], cell_size: 2.5, system: &system, copyright: None };
+        let about = RasterHead {
+            options: options("none"),
+            product: RasterProduct::Height,
+            corner: [0.0; 2],
+            cell_size: 2.5,
+            system: &system,
+            copyright: None,
+        };
         let image = |blocks: usize| RasterImage { size: [512, 512 * blocks as u32], lengths: vec![1 << 20; blocks] };
         let magic = |blocks: usize| head(&about, &[image(blocks)])[..4].to_vec();
         // With leaders and trailers, 4095 blocks of a mebibyte take a little less than 2^32 bytes, and their offsets fit.

@@ -169,6 +169,16 @@ impl RasterGrid {
         RasterGrid { alignment: self.alignment, first, size, narrow: wide.narrow_for(size), wide }
     }
 
+    /// Returns the grid with a column and a row more on each side: its cell (1, 1) is the cell (0, 0) of this one. Slopes need the heights
+    /// there; no file has these cells.
+    pub fn with_margin(&self) -> RasterGrid {
+        let first = self.first.map(|first| first - 1);
+        let first_center = self.wide.first_center.map(|center| center - self.wide.pitch);
+        let size = self.size.map(|side| side.saturating_add(2));
+        let wide = Subunits { first_center, ..self.wide };
+        RasterGrid { alignment: self.alignment, first, size, narrow: wide.narrow_for(size), wide }
+    }
+
     /// Returns the columns and the rows of the files of the raster, row by row. Files are cut at whole multiples of `side` cells from the
     /// origin: at the same places in neighbouring rasters. Without a side there is one file.
     pub fn files(&self, side: Option<FileSide>) -> Vec<[[u32; 2]; 2]> {

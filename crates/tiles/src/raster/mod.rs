@@ -1,4 +1,4 @@
-//! `terrain.tif`: the terrain as a raster of heights, a Cloud-Optimized GeoTIFF.
+//! `terrain.tif`: the terrain as a raster of heights, a Cloud-Optimized GeoTIFF; and the rasters that follow from it (`products.rs`).
 //!
 //! A cell has the height of the terrain at its centre. [`grid::RasterGrid`] says where the centres are, in whole numbers, so which triangle
 //! holds a centre is decided exactly. The height follows from that triangle's corners alone (`height.rs`), or, on an
@@ -13,6 +13,7 @@ pub mod grid;
 pub(crate) mod height;
 pub mod options;
 pub mod overview;
+pub mod products;
 pub(crate) mod tags;
 pub(crate) mod whole_numbers;
 pub mod window;

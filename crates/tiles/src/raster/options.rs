@@ -1,6 +1,7 @@
 //! The options of `[output.raster]`.
 
 use crate::raster::BLOCK;
+use crate::raster::products::RasterProducts;
 use lattice::shortest_decimal;
 use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
@@ -14,6 +15,9 @@ pub struct RasterOptions {
     /// Where a corner of a cell is; (0, 0) if the user says nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<CellOrigin>,
+    /// What is written besides, or in place of, the heights.
+    #[serde(default, skip_serializing_if = "RasterProducts::is_default")]
+    pub products: RasterProducts,
     /// How the file is packed.
     #[serde(default)]
     pub compression: RasterCompression,
@@ -170,11 +174,11 @@ impl Nodata {
     pub fn number(self) -> f32 {
         self.0
     }
+}
 
-    /// Returns the number as GDAL writes it into a file.
-    pub fn text(self) -> String {
-        if self.0.is_nan() { "nan".into() } else { f64::from(self.0).to_string() }
-    }
+/// Returns the number for no value as GDAL writes it into a file.
+pub fn nodata_text(nodata: f32) -> String {
+    if nodata.is_nan() { "nan".into() } else { f64::from(nodata).to_string() }
 }
 
 impl TryFrom<toml::Value> for Nodata {

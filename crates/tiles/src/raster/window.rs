@@ -3,6 +3,7 @@
 use crate::raster::BLOCK;
 use crate::raster::grid::{Beside, RasterGrid, Subunits};
 use crate::raster::height::{Corners, HeightTriangle};
+use crate::raster::products::{GradientScale, Neighbours, RasterProduct};
 use crate::raster::whole_numbers::WholeNumber;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -34,17 +35,23 @@ pub struct LatticeMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// A window on a raster. Any thread may draw into it: where triangles meet, all of them give a cell the same bits.
+/// A window on a raster, with a cell more on each side, for slopes. Any thread may draw into it: where triangles meet, all of them give a
+/// cell the same bits.
 pub struct Window<'a> {
+    /// The grid of the raster with its margin.
     grid: &'a RasterGrid,
     heights: HeightScale,
-    /// The first column and row.
+    gradients: GradientScale,
+    /// The first column and row of the window in the raster, which is that of its margin in the grid.
     first: [u32; 2],
     /// Columns and rows, some of which may lie outside the raster.
     side: usize,
-    /// The bits of the heights, row by row; those of NaN where there is none.
+    /// The bits of the heights, row by row with the margin; those of NaN where there is none.
     cells: Vec<AtomicU32>,
 }
+
+/// Cells around a window or a raster that have no place in its file.
+const MARGIN: usize = 1;
 
 /// The process asks whether it should stop after this many triangles: slivers as long as the terrain take long.
 const TRIANGLES_BETWEEN_CHECKS: usize = 1 << 12;
@@ -53,10 +60,11 @@ const TRIANGLES_BETWEEN_CHECKS: usize = 1 << 12;
 const FEW: u32 = 4;
 
 impl<'a> Window<'a> {
-    /// Returns an empty window with a side of so many cells.
-    pub fn new(grid: &'a RasterGrid, heights: HeightScale, side: usize) -> Window<'a> {
-        let cells = (0..side * side).into_par_iter().map(|_| AtomicU32::new(f32::NAN.to_bits())).collect();
-        Window { grid, heights, first: [0; 2], side, cells }
+    /// Returns an empty window with a side of so many cells. `grid` is the raster's [`RasterGrid::with_margin`].
+    pub fn new(grid: &'a RasterGrid, heights: HeightScale, gradients: GradientScale, side: usize) -> Window<'a> {
+        let stored = (side + 2 * MARGIN) * (side + 2 * MARGIN);
+        let cells = (0..stored).into_par_iter().map(|_| AtomicU32::new(f32::NAN.to_bits())).collect();
+        Window { grid, heights, gradients, first: [0; 2], side, cells }
     }
 
     /// Moves the window so that its first column and row are these, and empties it.
@@ -73,7 +81,40 @@ impl<'a> Window<'a> {
 
     /// Returns the height of a cell by its number in the window, row by row; NaN if it has none.
     pub fn height(&self, number: usize) -> f32 {
-        f32::from_bits(self.cells[number].load(Ordering::Relaxed))
+        if self.is_inside(number) { self.stored(self.place(number)) } else { f32::NAN }
+    }
+
+    /// Returns what a raster of `product` has in a cell, by its number in the window, row by row; NaN if it has nothing.
+    pub fn value(&self, product: RasterProduct, number: usize) -> f32 {
+        if product == RasterProduct::Height || !self.is_inside(number) {
+            return self.height(number);
+        }
+        let center = self.place(number);
+        let stride = self.stride();
+        let around = |n: usize| self.stored(center + n / 3 * stride + n % 3 - stride - 1);
+        product.value(Neighbours(std::array::from_fn(around)), self.gradients)
+    }
+
+    /// Tells whether a cell of the window is one of the raster, and not of its margin or beyond.
+    #[inline]
+    fn is_inside(&self, number: usize) -> bool {
+        let cell = [number % self.side, number / self.side];
+        (0..2).all(|axis| self.first[axis] as usize + cell[axis] + 2 * MARGIN < self.grid.size()[axis] as usize)
+    }
+
+    fn stride(&self) -> usize {
+        self.side + 2 * MARGIN
+    }
+
+    /// Returns where a cell is stored.
+    #[inline]
+    fn place(&self, number: usize) -> usize {
+        (number / self.side + MARGIN) * self.stride() + number % self.side + MARGIN
+    }
+
+    #[inline]
+    fn stored(&self, place: usize) -> f32 {
+        f32::from_bits(self.cells[place].load(Ordering::Relaxed))
     }
 
     /// Draws the triangles of `mesh`: every cell whose centre is in one of them, or on its border, gets its height there.
@@ -114,7 +155,7 @@ impl<'a> Window<'a> {
     fn within(&self, axis: usize, [a, b, c]: [Beside; 3]) -> [u32; 2] {
         let (from, past) = (a.from.min(b.from).min(c.from), a.past.max(b.past).max(c.past));
         let first = self.first[axis];
-        [from.max(first), past.min(first.saturating_add(self.side as u32))]
+        [from.max(first), past.min(first.saturating_add(self.stride() as u32))]
     }
 
     fn draw_triangle<T: WholeNumber>(
@@ -158,40 +199,23 @@ impl<'a> Window<'a> {
     }
 
     fn cell(&self, column: u32, row: u32) -> &AtomicU32 {
-        &self.cells[(row - self.first[1]) as usize * self.side + (column - self.first[0]) as usize]
+        &self.cells[(row - self.first[1]) as usize * self.stride() + (column - self.first[0]) as usize]
     }
 }
 
-/// A block of an image.
-pub struct FilledBlock {
-    /// Its cells row by row, with the number for none where there is no height.
-    pub cells: Vec<f32>,
-    /// How many of them have a height.
-    pub heights: u64,
-    /// How many of these are just the number for none.
-    pub same_as_nodata: u64,
-}
-
-/// Returns a block of an image with a side of so many pixels, by its column and row among the blocks. Returns `None` if it has no height.
-/// `pixel` is the image, with NaN where there is none.
-pub fn filled(
-    side: usize,
-    [column, row]: [usize; 2],
-    nodata: f32,
-    pixel: impl Fn(usize) -> f32,
-) -> Option<FilledBlock> {
+/// Returns the cells, row by row, of a block of an image with a side of so many pixels, by its column and row among the blocks. Returns
+/// `None` if it has no value. `pixel` is the image, with NaN where there is none, which becomes `nodata`.
+pub fn filled(side: usize, [column, row]: [usize; 2], nodata: f32, pixel: impl Fn(usize) -> f32) -> Option<Vec<f32>> {
     let first = row * BLOCK * side + column * BLOCK;
-    let mut block = FilledBlock { cells: Vec::with_capacity(BLOCK * BLOCK), heights: 0, same_as_nodata: 0 };
+    let (mut cells, mut has_values) = (Vec::with_capacity(BLOCK * BLOCK), false);
     for row in 0..BLOCK {
         for column in 0..BLOCK {
-            let height = pixel(first + row * side + column);
-            let is_height = !height.is_nan();
-            block.heights += u64::from(is_height);
-            block.same_as_nodata += u64::from(height == nodata);
-            block.cells.push(if is_height { height } else { nodata });
+            let value = pixel(first + row * side + column);
+            has_values |= !value.is_nan();
+            cells.push(if value.is_nan() { nodata } else { value });
         }
     }
-    (block.heights > 0).then_some(block)
+    has_values.then_some(cells)
 }
 
 /// Returns the columns of a row in which no weight is negative. `first` are those of the first column.
@@ -224,6 +248,7 @@ mod tests {
     use rust_decimal::Decimal;
 
     const SCALE: HeightScale = HeightScale { offset: 0.0, step: 1.0 };
+    const GRADIENTS: GradientScale = GradientScale::new(1.0, 1.0, 1.0);
 
     fn grid(cell: Decimal) -> RasterGrid {
         let lattice = Lattice::new([Decimal::ZERO; 3], Decimal::ONE, Decimal::ONE).unwrap();
@@ -231,7 +256,8 @@ mod tests {
     }
 
     fn drawn(grid: &RasterGrid, positions: &[[i32; 3]], triangles: &[[u32; 3]]) -> Vec<u32> {
-        let window = Window::new(grid, SCALE, 64);
+        let grid = grid.with_margin();
+        let window = Window::new(&grid, SCALE, GRADIENTS, 64);
         window.draw(&LatticeMesh { positions: positions.to_vec(), triangles: triangles.to_vec() }).unwrap();
         (0..64 * 64).map(|number| window.height(number).to_bits()).collect()
     }
@@ -294,7 +320,8 @@ mod tests {
     fn a_window_has_its_part_of_the_raster() {
         let grid = grid(Decimal::ONE);
         let mesh = LatticeMesh { positions: vec![[0, 0, 0], [40, 0, 40], [0, 40, 0]], triangles: vec![[0, 1, 2]] };
-        let mut window = Window::new(&grid, SCALE, 16);
+        let grid = grid.with_margin();
+        let mut window = Window::new(&grid, SCALE, GRADIENTS, 16);
         window.move_to([16, 16]);
         window.draw(&mesh).unwrap();
         // The cell in column 18 and row 22, and one beyond the long edge.

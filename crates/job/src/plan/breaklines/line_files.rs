@@ -1,10 +1,10 @@
 //! The files of lines: which ones the options name, and what they hold.
 
 use crate::options::JobOptions;
-use crate::plan::breaklines::line_crs::{SystemOfPoints, bring_to_points};
 use crate::plan::extent::Extent;
 use crate::plan::named_files::files_of;
 use breaklines::FeatureKind;
+use points::lines::line_crs::{SystemOfPoints, bring_to_points};
 use points::lines::options::LineOptions;
 use points::lines::{LineFeature, LineFile, is_side_file, read_lines};
 use points::{is_number_in_steps, shown_height};
@@ -195,16 +195,18 @@ mod tests {
     use super::*;
     use crs::Crs;
     use points::lines::LineShape;
+    use points::lines::options::LinePurpose;
     use sys::ErrorKind;
 
     fn extended(kind: FeatureKind, heights: [f64; 4]) -> Result<[f64; 2]> {
         let corners = [[-50.0, -50.0], [60.0, -50.0], [60.0, 70.0], [-50.0, 70.0]];
         let ring = corners.iter().zip(heights).map(|([x, y], z)| [*x, *y, z]).collect();
         let shape = if kind == FeatureKind::Lake { LineShape::Area(vec![ring]) } else { LineShape::Line(ring) };
-        let features = vec![LineFeature { number: 4, kind, shape }];
+        let features = vec![LineFeature { number: 4, name: None, kind, shape }];
         let file = LineFile {
             path: "a.shp".into(),
             crs: Crs::default(),
+            purpose: LinePurpose::default(),
             height_scale: 1.0,
             features,
             warnings: Warnings::default(),

@@ -1,7 +1,6 @@
 //! Breaklines in the plan: the files of lines are read, brought to the lattice and cut. What they are cut from is kept in the plan, so that
 //! every task and every later run cuts the same, and needs none of the files.
 
-mod line_crs;
 pub(crate) mod line_files;
 mod on_lattice;
 mod other_unit;
@@ -11,6 +10,5 @@ mod spacing;
 mod suspect_heights;
 mod terrain;
 
-pub(crate) use line_crs::SystemOfPoints;
 pub(crate) use planned::CloudOfPlan;
 pub use planned::PlannedBreaklines;

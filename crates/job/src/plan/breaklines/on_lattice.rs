@@ -100,6 +100,7 @@ fn banks(mut ring: Vec<Vertex>) -> Vec<Vec<Vertex>> {
 mod tests {
     use super::*;
     use crs::Crs;
+    use points::lines::options::LinePurpose;
     use rust_decimal::Decimal;
     use sys::Warnings;
 
@@ -109,10 +110,11 @@ mod tests {
     }
 
     fn file(kind: FeatureKind, shape: LineShape) -> LineFile {
-        let features = vec![LineFeature { number: 5, kind, shape }];
+        let features = vec![LineFeature { number: 5, name: None, kind, shape }];
         LineFile {
             path: "a.shp".into(),
             crs: Crs::default(),
+            purpose: LinePurpose::default(),
             height_scale: 1.0,
             features,
             warnings: Warnings::default(),

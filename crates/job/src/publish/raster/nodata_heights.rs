@@ -4,7 +4,7 @@ use crate::publish::raster::tile_meshes::TileBox;
 use lattice::Lattice;
 use std::collections::BTreeSet;
 use sys::{Result, interrupt};
-use tiles::raster::options::Nodata;
+use tiles::raster::options::{Nodata, nodata_text};
 use tiles::raster::window::{HeightScale, LatticeMesh};
 
 /// The most points that the warning names.
@@ -55,7 +55,7 @@ impl NodataPoints {
 
     /// Returns the warning about the raster `file`, in which so many cells have this height.
     pub(super) fn warning(&self, file: &str, cells: u64, nodata: Nodata, lattice: &Lattice) -> String {
-        let height = nodata.text();
+        let height = nodata_text(nodata.number());
         let cells = match cells {
             1 => "1 cell".into(),
             cells => format!("{cells} cells"),

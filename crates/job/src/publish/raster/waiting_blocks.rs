@@ -1,17 +1,13 @@
 //! Packed blocks, in a file of their own until the raster is put together.
 
-use crate::durable::atomic_file::{PendingFile, partial_path};
+use crate::durable::atomic_file::{PendingFile, PendingWriter};
 use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use sys::disk::WriteFrom;
 use sys::positional_io::read_exact_at;
 use sys::{Error, Result, disk, fault, interrupt};
-use tiles::checksums::Checksum;
 use tiles::raster::geotiff::{RasterImage, TRAILER};
 use tiles::raster::grid::blocks;
-use xxhash_rust::xxh3::Xxh3;
 
 /// The blocks of a raster and its overviews. Threads may add blocks in any order.
 pub(crate) struct WaitingBlocks {
@@ -96,15 +92,8 @@ impl FinishedBlocks {
     /// # Errors
     /// [`Error::Io`], [`Error::Interrupted`].
     pub(crate) fn write(self, head: &[u8], path: &Path) -> Result<PendingFile> {
-        let partial = partial_path(path);
-        let file = disk::create(&partial).map_err(Error::io("create", &partial))?;
-        let mut out = HashedWriter {
-            writer: BufWriter::with_capacity(1 << 20, WriteFrom { file: &file, at: 0 }),
-            hasher: Xxh3::new(),
-            bytes: 0,
-        };
-        let written = |out: &mut HashedWriter<_>, bytes: &[u8]| out.write(bytes).map_err(Error::io("write", &partial));
-        written(&mut out, head)?;
+        let mut out = PendingWriter::create(path)?;
+        out.write(head)?;
         let mut block = Vec::new();
         for (at, length) in self.of_images.iter().rev().flatten().copied() {
             interrupt::check()?;
@@ -118,28 +107,13 @@ impl FinishedBlocks {
                 let read = fault::read("read-result").and_then(|()| read_exact_at(&self.file, &mut block, at));
                 read.map_err(Error::io("read", &self.path))?;
             }
-            written(&mut out, &(block.len() as u32).to_le_bytes())?;
-            written(&mut out, &block)?;
-            written(&mut out, &block[block.len().saturating_sub(TRAILER)..])?;
+            out.write(&(block.len() as u32).to_le_bytes())?;
+            out.write(&block)?;
+            out.write(&block[block.len().saturating_sub(TRAILER)..])?;
         }
-        out.writer.flush().map_err(Error::io("write", &partial))?;
+        let raster = out.finish()?;
         drop(self.file);
         disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))?;
-        Ok(PendingFile { path: path.into(), bytes: out.bytes, checksum: Checksum::of_hasher(&out.hasher) })
-    }
-}
-
-/// Counts and hashes what is written.
-struct HashedWriter<W> {
-    writer: W,
-    hasher: Xxh3,
-    bytes: u64,
-}
-
-impl<W: Write> HashedWriter<W> {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        self.hasher.update(bytes);
-        self.bytes += bytes.len() as u64;
-        self.writer.write_all(bytes)
+        Ok(raster)
     }
 }

@@ -1,4 +1,4 @@
-//! Writing `terrain.tif`.
+//! Writing `terrain.tif`, and the rasters that follow from it.
 
 use crate::durable::atomic_file::{PendingFile, create_folder_of, write_pending};
 use crate::durable::directory::JobDirectory;
@@ -25,6 +25,7 @@ use tiles::raster::file_list::{ListedFile, RasterList};
 use tiles::raster::geotiff::{RasterHead, head};
 use tiles::raster::grid::{RasterGrid, blocks};
 use tiles::raster::options::RasterOptions;
+use tiles::raster::products::{GradientScale, RasterProduct, RasterProducts};
 use tiles::raster::window::{HeightScale, LatticeMesh, Window};
 
 /// The most levels that are drawn in one window, whose side is 512 times two to the power of this.
@@ -38,6 +39,9 @@ const WINDOW_SHARE: u64 = 4;
 pub struct RasterStats {
     /// Columns and rows.
     pub size: [u32; 2],
+    /// What was written.
+    #[serde(default)]
+    pub products: RasterProducts,
     /// The number of GeoTIFF files.
     pub files: u64,
     /// Bytes of these files, and of the list of them if there are several.
@@ -58,8 +62,8 @@ impl AddAssign for RasterStats {
 
 /// A file of a raster.
 struct RasterPart {
-    /// Its path from the output directory, in a grid of files.
-    uri: Option<String>,
+    /// Its number, in a grid of files.
+    number: Option<usize>,
     /// The columns and the rows of the raster that it has, each as the first and the one after the last.
     cells: [[u32; 2]; 2],
     grid: RasterGrid,
@@ -72,7 +76,7 @@ pub(crate) struct RasterWork<'a> {
     frame: &'a Frame,
     grid: RasterGrid,
     boxes: Vec<TileBox>,
-    /// The tiles that may cover a cell.
+    /// The tiles that may cover a cell of the grid with its margin.
     tiles: Vec<TileCells>,
 }
 
@@ -87,8 +91,9 @@ impl<'a> RasterWork<'a> {
         let all = boxes.iter().map(|tile| tile.bounds).reduce(Bounds::union);
         let all = all.ok_or_else(|| Error::Broken("there is no tile to make a raster of".into()))?;
         let grid = grid_over(plan, &options, all)?;
+        let with_margin = grid.with_margin();
         let cells = |tile: &TileBox| {
-            let [columns, rows] = grid.cells_within(tile.bounds);
+            let [columns, rows] = with_margin.cells_within(tile.bounds);
             (columns[0] < columns[1] && rows[0] < rows[1]).then_some(TileCells { tile: tile.tile, columns, rows })
         };
         let tiles = boxes.iter().filter_map(cells).collect();
@@ -106,7 +111,7 @@ impl<'a> RasterWork<'a> {
     fn parts(&self) -> Vec<RasterPart> {
         let side = self.options.cells_per_file;
         let parts = (0..).zip(self.grid.files(side));
-        let part = |(n, cells)| RasterPart { uri: side.map(|_| raster_uri(n)), cells, grid: self.grid.part(cells) };
+        let part = |(n, cells)| RasterPart { number: side.map(|_| n), cells, grid: self.grid.part(cells) };
         parts.map(part).collect()
     }
 
@@ -119,25 +124,28 @@ impl<'a> RasterWork<'a> {
         directory: &JobDirectory,
         done: &(dyn Fn() + Sync),
     ) -> Result<(RasterStats, Vec<PendingFile>)> {
-        let mut stats = RasterStats { size: self.grid.size(), ..RasterStats::default() };
+        let products = self.options.products;
+        let mut stats = RasterStats { size: self.grid.size(), products, ..RasterStats::default() };
         let (mut files, mut listed) = (Vec::new(), Vec::new());
         for part in self.parts() {
-            let Some((file, figures)) = self.write_part(directory, &part, done)? else { continue };
+            let Some((of_part, figures)) = self.write_part(directory, &part, done)? else { continue };
             stats += figures;
-            files.push(file);
-            listed.extend(part.uri.map(|uri| ListedFile { uri, cells: part.cells }));
+            files.extend(of_part);
+            listed.push(part);
         }
         if self.options.cells_per_file.is_some() {
-            files.push(self.write_list(directory, listed)?);
+            for product in products.iter() {
+                files.push(self.write_list(directory, product, &listed)?);
+            }
         }
         stats.bytes = files.iter().map(|file| file.bytes).sum();
         Ok((stats, files))
     }
 
-    /// Returns the tiles that may cover cells of a file, with the cells counted from its own first.
+    /// Returns the tiles that may cover cells of a file or its margin, with the cells counted from the first of the margin.
     fn tiles_of(&self, part: &RasterPart) -> Vec<TileCells> {
         let within = |own: [u32; 2], cells: [u32; 2]| {
-            let [from, to] = [own[0].max(cells[0]), own[1].min(cells[1])];
+            let [from, to] = [own[0].max(cells[0]), own[1].min(cells[1].saturating_add(2))];
             (from < to).then(|| [from - cells[0], to - cells[0]])
         };
         let tiles = self.tiles.iter().filter_map(|tile| {
@@ -154,64 +162,97 @@ impl<'a> RasterWork<'a> {
         directory: &JobDirectory,
         part: &RasterPart,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Option<(PendingFile, RasterStats)>> {
+    ) -> Result<Option<(Vec<PendingFile>, RasterStats)>> {
         let tiles = self.tiles_of(part);
-        let may_be_empty = part.uri.is_some();
+        let may_be_empty = part.number.is_some();
         if tiles.is_empty() && may_be_empty {
             return Ok(None);
         }
         let levels = part.grid.levels();
-        let waiting = WaitingBlocks::create(&directory.raster_blocks(), &levels)?;
+        let create = |product| Ok((product, WaitingBlocks::create(&directory.raster_blocks(product), &levels)?));
+        let rasters = self.options.products.iter().map(create).collect::<Result<Vec<_>>>()?;
         let window_level = window_level(working_memory(&self.plan.options)).min(levels.len() - 1);
         let read = |tile: TileIndex| self.mesh(directory, tile);
         let pyramid = Pyramid {
             options: self.options,
-            levels,
+            levels: levels.clone(),
             window_level,
             read: &read,
-            blocks: &waiting,
+            rasters: &rasters,
             done,
             heights: AtomicU64::new(0),
             same_as_nodata: AtomicU64::new(0),
         };
-        let mut window = Window::new(&part.grid, self.heights(), BLOCK << window_level);
+        let grid = part.grid.with_margin();
+        let mut window = Window::new(&grid, self.heights(), self.gradients(), BLOCK << window_level);
         pyramid.draw(&mut window, &tiles)?;
         drop(window);
-        let Pyramid { levels, heights, same_as_nodata, .. } = pyramid;
-        let (heights, same_as_nodata) = (heights.into_inner(), same_as_nodata.into_inner());
+        let (heights, same_as_nodata) = (pyramid.heights.into_inner(), pyramid.same_as_nodata.into_inner());
         if heights == 0 && may_be_empty {
-            waiting.discard()?;
+            rasters.into_iter().try_for_each(|(_, waiting)| waiting.discard())?;
             return Ok(None);
         }
-        let nodata = self.options.nodata.number();
-        let blocks = waiting.finish(packed(&vec![nodata; BLOCK * BLOCK], self.options.compression));
-        let system = system_of(self.plan);
+        let write = |(product, waiting)| self.write_file(directory, part, product, waiting, &levels);
+        let files = rasters.into_iter().map(write).collect::<Result<Vec<_>>>()?;
+        let count = files.len() as u64;
+        Ok(Some((files, RasterStats { files: count, heights, same_as_nodata, ..RasterStats::default() })))
+    }
+
+    /// Puts a file together from its blocks.
+    fn write_file(
+        &self,
+        directory: &JobDirectory,
+        part: &RasterPart,
+        product: RasterProduct,
+        waiting: WaitingBlocks,
+        levels: &[[u32; 2]],
+    ) -> Result<PendingFile> {
+        let empty = vec![product.nodata(self.options.nodata.number()); BLOCK * BLOCK];
+        let blocks = waiting.finish(packed(&empty, product, self.options.compression));
         let about = RasterHead {
             options: self.options,
+            product,
             corner: part.grid.corner(),
             cell_size: part.grid.cell_size(),
-            system: &system,
+            system: &system_of(self.plan),
             copyright: self.plan.options.output.copyright(),
         };
-        let head = head(&about, &blocks.images(&levels));
+        let head = head(&about, &blocks.images(levels));
         let output = directory.output();
-        let path = part.uri.as_ref().map_or_else(|| output.raster(), |uri| output.directory().join(uri));
+        let path = match part.number {
+            Some(number) => output.directory().join(raster_uri(product, number)),
+            None => output.raster(product),
+        };
         create_folder_of(&path)?;
-        let file = blocks.write(&head, &path)?;
-        Ok(Some((file, RasterStats { files: 1, heights, same_as_nodata, ..RasterStats::default() })))
+        blocks.write(&head, &path)
     }
 
     /// Writes the list by which programs open all files as one raster.
-    fn write_list(&self, directory: &JobDirectory, files: Vec<ListedFile>) -> Result<PendingFile> {
+    fn write_list(
+        &self,
+        directory: &JobDirectory,
+        product: RasterProduct,
+        files: &[RasterPart],
+    ) -> Result<PendingFile> {
+        let listed = |part: &RasterPart| {
+            part.number.map(|number| ListedFile { uri: raster_uri(product, number), cells: part.cells })
+        };
         let list = RasterList {
             size: self.grid.size(),
             corner: self.grid.corner(),
             cell_size: self.grid.cell_size(),
-            nodata: self.options.nodata,
+            product,
+            nodata: product.nodata(self.options.nodata.number()),
             system: &system_of(self.plan),
-            files,
+            files: files.iter().filter_map(listed).collect(),
         };
-        write_pending(&directory.output().raster_list(), list.to_string().as_bytes())
+        write_pending(&directory.output().raster_list(product), list.to_string().as_bytes())
+    }
+
+    /// Returns how differences of heights become slopes.
+    fn gradients(&self) -> GradientScale {
+        let extras = self.frame.extras();
+        GradientScale::new(self.grid.cell_size(), extras.metres_per_unit, extras.metres_per_unit_z)
     }
 
     fn heights(&self) -> HeightScale {
@@ -230,16 +271,17 @@ impl<'a> RasterWork<'a> {
     pub(crate) fn warnings(&self, directory: &JobDirectory, stats: &RasterStats) -> Result<Vec<String>> {
         let file = if self.options.cells_per_file.is_some() { "terrain.vrt" } else { "terrain.tif" };
         let nodata = self.options.nodata;
+        let has_heights = self.options.products.iter().any(|product| product == RasterProduct::Height);
         let mut warnings = Vec::new();
-        if stats.same_as_nodata > 0 {
+        if stats.same_as_nodata > 0 && has_heights {
             let read = |tile: &TileBox| self.mesh(directory, tile.tile);
             let points = NodataPoints::find(&self.boxes, self.heights(), nodata, &read)?;
             warnings.push(points.warning(file, stats.same_as_nodata, nodata, &self.plan.lattice));
         }
         if stats.heights == 0 {
-            warnings.push(format!(
-                "{file} has no height, because no centre of a cell lies within the terrain: set a finer [output.raster] resolution"
-            ));
+            warnings.push(
+                "the raster is empty: no cell has its centre within the terrain; fix: a finer [output.raster] resolution".into(),
+            );
         }
         warnings.extend(system_warning(&self.plan.crs, &system_of(self.plan)));
         Ok(warnings)

@@ -11,6 +11,8 @@ use crate::plan::job_plan::Plan;
 use crate::plan::no_points::no_triangle;
 use crate::progress::number_text::grouped;
 use crate::publish::classified::{ClassifiedInputs, write_all};
+use crate::publish::contours::write_contours::{ContourStats, ContourWork};
+use crate::publish::exports::write_exports::{ExportWork, ExportedFile, Exports};
 use crate::publish::flat_tile::FlatScene;
 use crate::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::publish::placement::{heights_warning, place, placement_warning};
@@ -235,6 +237,11 @@ fn some_triangles(written: &TileStats, plan: &Plan) -> crate::Result<()> {
         };
         // The rule for the hull never leaves out more than half of the mesh.
         let by_length = written.cut_triangles - written.slivers;
+        if plan.clip.is_some() && plan.options.output.max_edge == tiles::options::MaxEdge::None {
+            return Err(crate::Error::NoTerrain(format!(
+                "all {by_length} triangles{slivers} lie outside the polygons of [input] clip, which hold only a few points"
+            )));
+        }
         return Err(Error::Config(format!(
             "[output] max_edge leaves out all {by_length} triangles{slivers}: give a greater one"
         ))
@@ -249,6 +256,8 @@ struct Published {
     bytes: u64,
     levels: LevelStats,
     raster: Option<RasterStats>,
+    contours: Option<ContourStats>,
+    exports: Vec<ExportedFile>,
     warnings: Warnings,
 }
 
@@ -285,6 +294,8 @@ fn publish(
 ) -> Result<Published> {
     let plan = job.plan;
     let raster = write_raster(run, plan, &appearance.style.frame, written.tiles)?;
+    let contours = write_contours(run, plan, &appearance.style.frame, written.tiles)?;
+    let exports = write_exports(run, plan, &appearance.style.frame, written)?;
     let classified = write_classified(run, job)?;
     let stage = run.progress.stage("publish", 1, "job");
     let output = &plan.options.output;
@@ -336,9 +347,12 @@ fn publish(
     }
     stage.advance(1);
     run.add_stage(stage.finish());
-    let bytes = bytes + raster.map_or(0, |raster| raster.bytes) + classified.bytes;
+    let exported: u64 = exports.files.iter().map(|file| file.bytes).sum();
+    let rasters_and_lines = raster.map_or(0, |raster| raster.bytes) + contours.map_or(0, |lines| lines.bytes);
+    let bytes = bytes + rasters_and_lines + exported + classified.bytes;
+    warnings.extend(exports.warnings);
     warnings.extend(classified.warnings);
-    Ok(Published { bytes, levels: stats, raster, warnings })
+    Ok(Published { bytes, levels: stats, raster, contours, exports: exports.files, warnings })
 }
 
 /// The raster of a job.
@@ -358,6 +372,31 @@ fn write_raster(run: &WholeRun, plan: &Plan, frame: &Frame, tiles: &dyn EachTile
     let stats = run.journal.step(JobStep::Raster, || work.write(run.directory, &|| stage.advance(1)))?;
     run.add_stage(stage.finish());
     Ok(Some(WrittenRaster { warnings: work.warnings(run.directory, &stats)?, stats }))
+}
+
+/// Writes contour lines, if the user wants some. The scene of the tiles is that of `frame`.
+///
+/// # Errors
+/// Those of [`ContourWork`].
+fn write_contours(run: &WholeRun, plan: &Plan, frame: &Frame, tiles: &dyn EachTile) -> Result<Option<ContourStats>> {
+    let Some(work) = ContourWork::of(plan, frame, tiles)? else { return Ok(None) };
+    let stage = run.progress.stage("contours", work.steps(), "tiles and levels");
+    let stats = run.journal.step(JobStep::Contours, || work.write(run.directory, &|steps| stage.advance(steps)))?;
+    run.add_stage(stage.finish());
+    Ok(Some(stats))
+}
+
+/// Writes the mesh for other programs, if the user wants that. The scene of the tiles is that of `frame`.
+///
+/// # Errors
+/// Those of [`ExportWork`].
+fn write_exports(run: &WholeRun, plan: &Plan, frame: &Frame, written: &WrittenFiles) -> Result<Exports> {
+    let Some(work) = ExportWork::of(plan, frame, written.tiles, &written.stats)? else { return Ok(Exports::default()) };
+    let stage = run.progress.stage("export", work.reads(), "triangles");
+    let advance = |triangles| stage.advance(triangles);
+    let exports = run.journal.step(JobStep::Exports, || work.write(run.directory, &advance))?;
+    run.add_stage(stage.finish());
+    Ok(exports)
 }
 
 /// Writes the inputs with the classes that the job has found, if the user wants that.
@@ -413,6 +452,8 @@ fn write_report(
         tiles: figures.tiles,
         levels: published.levels,
         raster: published.raster,
+        contours: published.contours,
+        exports: published.exports,
         warnings: published.warnings,
         other_bytes: published.bytes + list.bytes,
         temporary: figures.temporary,

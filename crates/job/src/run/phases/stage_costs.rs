@@ -12,10 +12,16 @@ const GROUND: f64 = 300.0;
 const SELECT: f64 = 1500.0;
 const LEVELS: f64 = 900.0;
 const PUBLISH: f64 = 8.0;
+/// Of numbering the mesh for exports, and of writing one.
+const NUMBER: f64 = 400.0;
+const EXPORT: f64 = 400.0;
 
 /// The same for each cell of a raster, and for each that is stored: with those of overviews, and those that only fill blocks.
 const RASTER: f64 = 170.0;
 const RASTER_STORED: f64 = 60.0;
+
+/// The same for each point of contour lines: it depends on how many there are.
+const CONTOURS: f64 = 250.0;
 
 fn cost_of_reading(format: FileFormat) -> f64 {
     match format {
@@ -32,14 +38,21 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
     let points = plan.records as f64;
     let raster = planned_raster(plan);
     let raster = raster.map_or(0.0, |grid| grid.cells() as f64 * RASTER + grid.stored_cells() as f64 * RASTER_STORED);
+    let exports = match plan.options.output.export.formats().count() {
+        0 => 0.0,
+        formats => NUMBER + formats as f64 * EXPORT,
+    };
     let ground = if plan.options.input.finds_ground() { GROUND } else { 0.0 };
     let selecting = if plan.options.output.selects() { SELECT } else { 0.0 };
+    let contours = if plan.options.output.contours.is_some() { CONTOURS } else { 0.0 };
     vec![
         ("read", reading),
         ("select", points * (ground + selecting)),
         ("mesh", points * MESH),
         ("levels", points * LEVELS),
         ("raster", raster),
+        ("export", points * exports),
+        ("contours", points * contours),
         ("publish", points * PUBLISH),
     ]
 }

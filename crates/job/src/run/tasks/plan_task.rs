@@ -12,6 +12,7 @@ use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
+use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::raster::check::check_raster;
 use crate::run::attempt::read_earlier;
@@ -57,6 +58,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
     check_raster(&plan)?;
+    check_contours(&plan)?;
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
     let threads = workers(options, plan.records)?;
     if !run.force {

@@ -1,13 +1,13 @@
-//! What can go wrong with a verification, beyond what every crate can meet.
+//! What can go wrong with a written terrain, beyond what every crate can meet.
 
 use std::path::PathBuf;
 use sys::ErrorKind;
 use sys::terminal::name;
 
-/// The result of what fails with an error of the verification.
+/// The result of what fails with an error of a written terrain.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Why there is no verdict. `Display` says what is wrong and what to do.
+/// Why a terrain cannot be read, or there is no verdict about it. `Display` says what is wrong and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// What every crate can meet.

@@ -1,26 +1,26 @@
 //! Lines come in the coordinate reference system of the points, or are transformed into it, or are refused. Their heights come in the unit
 //! of the points' heights.
 
+use crate::lines::LineFile;
+use crate::lines::options::{LineCrs, LineHeights, LineOptions, LinePurpose};
 use crs::{Crs, CrsKind, CrsTransform, DatumNote, DatumRule, Sameness, Unit, same_length};
-use points::lines::LineFile;
-use points::lines::options::{LineCrs, LineHeights, LineOptions};
 use sys::{Error, Result};
 
 /// What the points of a job are in.
-pub(crate) struct SystemOfPoints<'a> {
+pub struct SystemOfPoints<'a> {
     /// Their coordinate reference system.
-    pub(crate) crs: &'a Crs,
+    pub crs: &'a Crs,
     /// The length of the unit of their heights in metres: what is known of it, or else that of x and y; `None` if neither is known.
-    pub(crate) height_metres: Option<f64>,
+    pub height_metres: Option<f64>,
     /// Which datums are one.
-    pub(crate) datums: DatumRule,
+    pub datums: DatumRule,
 }
 
 /// Brings the features of `file` into the system of the `points`, and their heights into the unit of the points' heights.
 ///
 /// # Errors
 /// [`Error::Config`] if the lines are in another system, and there is no way from that to the one of the points.
-pub(super) fn bring_to_points(file: &mut LineFile, options: &LineOptions, points: &SystemOfPoints) -> Result<()> {
+pub fn bring_to_points(file: &mut LineFile, options: &LineOptions, points: &SystemOfPoints) -> Result<()> {
     let said = match &options.crs {
         LineCrs::OfPoints => Crs { vertical: points.height_metres, ..Crs::default() },
         LineCrs::Given { crs, .. } => (**crs).clone(),
@@ -105,12 +105,16 @@ fn unit_name(metres: f64) -> String {
 /// Warns if the lines or the points name no CRS, and the others do.
 fn warn_of_missing(file: &mut LineFile, own: &Crs, points: &Crs) {
     if points.is_named() && file.warnings.is_empty() {
-        file.warnings
-            .push(format!("it says no CRS: its lines are taken to be in that of the points, {}", points.label()));
+        file.warnings.push(format!(
+            "it says no CRS: its {} are taken to be in that of the points, {}",
+            file.purpose.features(),
+            points.label()
+        ));
     }
     if own.is_named() {
         file.warnings.push(format!(
-            "its lines are in {}, and the points say no CRS: they are taken to be in the same",
+            "its {} are in {}, and the points say no CRS: they are taken to be in the same",
+            file.purpose.features(),
             own.label()
         ));
     }
@@ -123,7 +127,7 @@ fn assumed(names: &str) -> String {
 /// Transforms the features of `file`, which are in the system `own`, into that of the points.
 fn transform(file: &mut LineFile, own: &Crs, points: &SystemOfPoints, has_heights: bool) -> Result<()> {
     let crs = points.crs;
-    let refuse = |why: &str| other_system(file, own, crs, why);
+    let refuse = |why: &str| other_system(file, own, points.crs, why);
     if !crs.is_named() {
         return Err(refuse("the points do not say where they are"));
     }
@@ -155,13 +159,20 @@ fn transform(file: &mut LineFile, own: &Crs, points: &SystemOfPoints, has_height
         }
         false => String::new(),
     };
-    file.warnings.push(format!("its lines are transformed from {} to {target}{heights}", own.label()));
+    file.warnings.push(format!(
+        "its {} are transformed from {} to {target}{heights}",
+        file.purpose.features(),
+        own.label()
+    ));
     match way.datums() {
         DatumNote::Same => {}
         DatumNote::Assumed(names) => file.warnings.push(assumed(names)),
-        DatumNote::TakenAlike(names) => file
+        DatumNote::TakenAlike(names) if file.purpose == LinePurpose::Breaklines => file
             .warnings
             .push(format!("[input] datums = \"close\" takes {names} for one datum; they may be a metre or two apart")),
+        DatumNote::TakenAlike(names) => {
+            file.warnings.push(format!("no datum shift between {names}, which may be a metre or two apart"));
+        }
     }
     if has_heights {
         file.warnings.extend(own.depths().filter(|_| crs.vertical_system.is_none()));
@@ -170,15 +181,21 @@ fn transform(file: &mut LineFile, own: &Crs, points: &SystemOfPoints, has_height
 }
 
 fn other_system(file: &LineFile, own: &Crs, points: &Crs, why: &str) -> Error {
-    let path = file.path.display();
+    let (path, features) = (file.path.display(), file.purpose.features());
     let how = match points.epsg {
-        Some(code) => format!("for example with `ogr2ogr -t_srs EPSG:{code} lines.gpkg {path}`"),
+        Some(code) => format!("for example with `ogr2ogr -t_srs EPSG:{code} {features}.gpkg {path}`"),
         None => "for example in QGIS".into(),
     };
     let points = if points.is_named() { points.label() } else { "a plane without a CRS".into() };
+    let remedy = match file.purpose {
+        LinePurpose::Breaklines => {
+            "say what it is with crs in [[breaklines]], such as crs = \"points\" for the CRS of the points".into()
+        }
+        LinePurpose::Clip | LinePurpose::Places => file.purpose.remedy_of_crs(&file.path),
+    };
     Error::Config(format!(
-        "{path} is in {}, but the points are in {points}: {why}. Transform the lines first, {how}; if what the file says is wrong, say what \
-         it is with crs in [[breaklines]], such as crs = \"points\" for the CRS of the points",
+        "{path} is in {}, but the points are in {points}: {why}. Transform the {features} first, {how}; if what the file says is wrong, \
+         {remedy}",
         own.label()
     ))
 }
@@ -186,9 +203,9 @@ fn other_system(file: &LineFile, own: &Crs, points: &Crs, why: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lines::{LineFeature, LineShape};
     use breaklines::FeatureKind;
     use crs::CrsChoice;
-    use points::lines::{LineFeature, LineShape};
     use sys::ErrorKind;
     use sys::Warnings;
 
@@ -211,8 +228,9 @@ mod tests {
         let mut file = LineFile {
             path: "a.gpkg".into(),
             crs: own.clone(),
+            purpose: LinePurpose::default(),
             height_scale: 1.0,
-            features: vec![LineFeature { number: 1, kind: FeatureKind::Line, shape }],
+            features: vec![LineFeature { number: 1, name: None, kind: FeatureKind::Line, shape }],
             warnings: Warnings::default(),
         };
         let options = toml::from_str(&format!("files = [\"a\"]\n{rest}")).unwrap();
@@ -250,10 +268,11 @@ mod tests {
         let [zone_15, wgs84] = ["EPSG:26915", "EPSG:4326"].map(system);
         let lines = |crs: &Crs, rule: DatumRule| {
             let shape = LineShape::Line(vec![SOUTH; 2]);
-            let features = vec![LineFeature { number: 1, kind: FeatureKind::Line, shape }];
+            let features = vec![LineFeature { number: 1, name: None, kind: FeatureKind::Line, shape }];
             let mut file = LineFile {
                 path: "a.gpkg".into(),
                 crs: crs.clone(),
+                purpose: LinePurpose::default(),
                 height_scale: 1.0,
                 features,
                 warnings: Warnings::default(),

@@ -7,6 +7,7 @@ use delaunay::geometry::Site;
 use lattice::shortest_decimal;
 use tiles::curvature::Curvature;
 use tiles::frame::Extras;
+use tiles::gltf::read::TilePart;
 
 /// Whole numbers below this are exact as f64.
 const EXACT_INTEGER: u128 = 1 << 53;
@@ -85,6 +86,19 @@ impl SourceGrid {
         is_nearest.then_some(point)
     }
 
+    /// Returns the lattice integers of the vertices of a mesh, or `None` if some are not on the lattice.
+    pub fn points_of(&self, mesh: &TilePart) -> Option<Vec<[i32; 3]>> {
+        let plain = if may_be_plain(mesh) { all_of(mesh, |world| self.integers(world)) } else { None };
+        plain.or_else(|| all_of(mesh, |world| self.integers_on(world, mesh.scale)))
+    }
+
+    /// Returns the scene positions in metres of the vertices of a mesh that are not on the lattice.
+    pub fn strays_of<'m>(&'m self, mesh: &'m TilePart) -> impl Iterator<Item = [f64; 3]> + 'm {
+        let is_plain = may_be_plain(mesh);
+        let integers = move |world| if is_plain { self.integers(world) } else { self.integers_on(world, mesh.scale) };
+        (0..mesh.positions.len()).map(|v| mesh.world(v)).filter(move |world| integers(*world).is_none())
+    }
+
     #[inline(always)]
     fn integers_within(&self, world: [f64; 3], tolerance: f64) -> Option<[i32; 3]> {
         let [xy, up] = self.per_metre;
@@ -117,6 +131,19 @@ impl SourceGrid {
     pub fn edge_text(&self, a: Site, b: Site) -> String {
         format!("{} to {}", self.site_text(a), self.site_text(b))
     }
+}
+
+/// A plain mesh has the scale 1. So has a quantized mesh with steps of one metre.
+fn may_be_plain(mesh: &TilePart) -> bool {
+    mesh.scale == [1.0; 3]
+}
+
+fn all_of(mesh: &TilePart, integers: impl Fn([f64; 3]) -> Option<[i32; 3]>) -> Option<Vec<[i32; 3]>> {
+    let mut points = Vec::with_capacity(mesh.positions.len());
+    for v in 0..mesh.positions.len() {
+        points.push(integers(mesh.world(v))?);
+    }
+    Some(points)
 }
 
 /// Returns `value` rounded to the nearest whole number if it is below 2^51, else something as large.
