@@ -105,20 +105,17 @@ impl Pyramid<'_> {
 
     /// Adds the blocks of a window to a raster, and those of its overviews. Returns the pixels of the last, which is one block.
     fn images(&self, raster: &(RasterProduct, WaitingBlocks), at: [usize; 2], window: &Window) -> Result<Vec<f32>> {
-        let (side, product) = (window.side(), raster.0);
-        let value = |number| window.value(product, number);
-        self.add_blocks(raster, 0, at, side, &value)?;
-        let mut image: Option<Vec<f32>> = None;
+        let (mut side, product) = (window.side(), raster.0);
+        // Slopes take longer than to keep them: both the blocks and the first overview need them.
+        let mut image: Vec<f32> =
+            (0..side * side).into_par_iter().map(|number| window.value(product, number)).collect();
+        self.add_blocks(raster, 0, at, side, &|number| image[number])?;
         for level in 1..=self.window_level {
-            let side = side >> (level - 1);
-            let next = match &image {
-                None => halved(product, side, value),
-                Some(image) => halved(product, side, |number| image[number]),
-            };
-            self.add_blocks(raster, level, at, side / 2, &|number| next[number])?;
-            image = Some(next);
+            image = halved(product, side, |number| image[number]);
+            side /= 2;
+            self.add_blocks(raster, level, at, side, &|number| image[number])?;
         }
-        Ok(image.unwrap_or_else(|| (0..side * side).map(value).collect()))
+        Ok(image)
     }
 
     /// Adds the blocks of the window `at`, whose image at `level` has a side of so many pixels.

@@ -297,9 +297,10 @@ pub(crate) fn raster_memory(plan: &Plan, threads: usize) -> u64 {
     window_bytes(level) + (threads * BLOCK_COPIES * BLOCK * BLOCK * size_of::<f32>()) as u64
 }
 
-/// Returns the bytes of a window with the cells of a block of this level, and of its overviews, which take a third of it together.
+/// Returns the bytes of a window with the cells of a block of this level, of the image that is made of it, and of the first overview, a
+/// quarter of it.
 fn window_bytes(level: usize) -> u64 {
-    ((BLOCK as u64) << level).pow(2) * size_of::<f32>() as u64 / 3 * 4
+    ((BLOCK as u64) << level).pow(2) * size_of::<f32>() as u64 / 4 * 9
 }
 
 /// Returns the level of which one block has the cells of a window, for a job with so much memory for work.
