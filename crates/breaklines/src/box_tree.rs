@@ -1,7 +1,7 @@
 //! A tree of boxes, which finds items near a place.
 
 use crate::exact::meet;
-use delaunay::geometry::{Bounds, Site};
+use delaunay::geometry::{Bounds, z_order};
 
 /// The number of children of a node.
 const FAN: usize = 8;
@@ -23,7 +23,7 @@ impl<T> Default for BoxTree<T> {
 impl<T: Copy> BoxTree<T> {
     /// Returns the tree of these items.
     pub(crate) fn new(mut items: Vec<(Bounds<2>, T)>) -> BoxTree<T> {
-        items.sort_by_cached_key(|(bounds, _)| curve_key(bounds.middle()));
+        items.sort_by_cached_key(|(bounds, _)| z_order(bounds.middle()));
         let mut levels: Vec<Vec<Bounds<2>>> = Vec::new();
         if items.len() > FAN {
             levels.push(items.chunks(FAN).filter_map(|chunk| joined(chunk.iter().map(|item| item.0))).collect());
@@ -87,24 +87,6 @@ impl<T: Copy> BoxTree<T> {
             },
         );
     }
-}
-
-/// Returns the place on a curve that goes through all squares of a size before it enters the next.
-fn curve_key(place: Site) -> u64 {
-    let spread = |value: i32| {
-        let mut v = u64::from(value as u32 ^ 1 << 31);
-        for (shift, mask) in [
-            (16, 0x0000_ffff_0000_ffff),
-            (8, 0x00ff_00ff_00ff_00ff),
-            (4, 0x0f0f_0f0f_0f0f_0f0f),
-            (2, 0x3333_3333_3333_3333),
-            (1, 0x5555_5555_5555_5555),
-        ] {
-            v = (v | v << shift) & mask;
-        }
-        v
-    };
-    spread(place[0]) | spread(place[1]) << 1
 }
 
 fn joined(boxes: impl Iterator<Item = Bounds<2>>) -> Option<Bounds<2>> {

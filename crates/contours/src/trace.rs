@@ -2,8 +2,9 @@
 
 use crate::chain::{Band, Chain};
 use crate::crossing_edges::{CrossedEdge, CrossingEdges, NONE, TriangleEdges};
-use crate::edge_key::{EdgeKey, curve_place};
+use crate::edge_key::EdgeKey;
 use crate::levels::{Level, Levels};
+use delaunay::geometry::z_order;
 use std::ops::Range;
 use sys::{Result, interrupt};
 
@@ -40,7 +41,7 @@ pub fn trace(
 ) -> Result<()> {
     let counts = levels.counts(vertices.iter().map(|vertex| vertex[2]));
     let CrossingEdges { edges, triangles } = CrossingEdges::of(triangles, &counts);
-    let places: Vec<u64> = vertices.iter().map(|&vertex| curve_place(vertex)).collect();
+    let places: Vec<u64> = vertices.iter().map(|&[x, y, _]| z_order([x, y])).collect();
     let keys = edges.iter().map(|edge| EdgeKey([edge.low, edge.high].map(|v| places[v as usize])));
     let keys: Vec<EdgeKey> = keys.collect();
     let tile = CrossedTile { vertices, edges: &edges, keys: &keys, triangles: &triangles, levels, plane };
