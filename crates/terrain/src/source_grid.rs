@@ -205,18 +205,23 @@ mod tests {
         assert!(DecimalAxis::new(0.0, 0.01).unwrap().world(0).is_sign_positive());
     }
 
-    #[test]
-    fn positions_off_the_lattice_are_refused() {
+    /// Returns a lattice in metres with steps of a centimetre, and of `resolution_z` for heights.
+    fn grid(resolution_z: f64) -> SourceGrid {
         let extras = Extras {
             offset: [0.0; 3],
             resolution: 0.01,
-            resolution_z: 0.001,
+            resolution_z,
             metres_per_unit: 1.0,
             metres_per_unit_z: 1.0,
             crs: None,
             curvature: None,
         };
-        let source = SourceGrid::new(&extras).unwrap();
+        SourceGrid::new(&extras).unwrap()
+    }
+
+    #[test]
+    fn positions_off_the_lattice_are_refused() {
+        let source = grid(0.001);
         assert_eq!(source.integers([0.012, 0.0041, -0.0502]), Some([1, 5, 4]));
         assert_eq!(source.integers([0.014, 0.0, 0.0]), None);
         assert_eq!(source.integers([1e30, 0.0, 0.0]), None);
@@ -225,16 +230,7 @@ mod tests {
 
     #[test]
     fn quantized_positions_are_next_to_the_lattice() {
-        let extras = Extras {
-            offset: [0.0; 3],
-            resolution: 0.01,
-            resolution_z: 0.01,
-            metres_per_unit: 1.0,
-            metres_per_unit_z: 1.0,
-            crs: None,
-            curvature: None,
-        };
-        let source = SourceGrid::new(&extras).unwrap();
+        let source = grid(0.01);
         let step = 1.0 / 128.0;
         let on = |x: f64| source.integers_on([x * step, 0.0, 0.0], [step; 3]);
         // 0.05 m is 6.4 steps.
