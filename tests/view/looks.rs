@@ -14,9 +14,16 @@ fn slide(id: &str, value: f64) -> String {
     )
 }
 
-/// Waits until the address has followed the view.
+/// Waits until the address has followed the view, and no more tiles come: one that is there may ask for finer ones in a later frame.
 fn settled() -> [Value; 2] {
-    [json!({"run": "new Promise((resolve) => setTimeout(resolve, 800))"}), json!({"wait": SHOWN})]
+    let still = format!(
+        "new Promise((resolve) => {{ let [drawn, frames, since] = ['', 0, Date.now()]; const look = () => {{ \
+         const now = document.getElementById('shown').textContent; \
+         if (now !== drawn || !({SHOWN})) [drawn, frames, since] = [now, 0, Date.now()]; \
+         frames += 1; \
+         if (frames > 20 && Date.now() - since > 800) resolve(); else requestAnimationFrame(look); }}; look(); }})"
+    );
+    [json!({"run": still}), json!({"wait": SHOWN})]
 }
 
 /// Returns how many pixels beside the panel differ between two pictures of a window that is 1280 pixels wide.
@@ -36,7 +43,7 @@ fn exaggerated_heights_are_told_as_they_are_and_a_link_shows_the_same() {
     // The page goes to the point again: the exaggeration has moved it out of the middle.
     let go_again =
         "document.getElementById('point-facts').replaceChildren(); document.querySelector('#go button').click()";
-    let address = "[location.hash, history.length]";
+    let address = "[location.hash, history.length, document.getElementById('shown').textContent]";
     let mut steps = steps_to(&terrain, wanted).as_array().unwrap().clone();
     steps.extend([json!({"run": set}), json!({"run": go_again}), json!({"wait": format!("{FOUND} && {SHOWN}")})]);
     steps.push(json!({"run": "document.getElementById('point-facts').children[5].textContent"}));
@@ -57,7 +64,7 @@ fn exaggerated_heights_are_told_as_they_are_and_a_link_shows_the_same() {
     for part in ["view=", "colours=height", "exaggeration=4", "sun=90,45"] {
         assert!(set[0].as_str().unwrap().contains(part), "{set}");
     }
-    assert_eq!([linked, again], [set; 2]);
+    assert_eq!((linked, &linked[0], &linked[1]), (again, &set[0], &set[1]));
     let [same, other] = [shot("again.png"), terrain.picture()].map(|picture| differing(&shot("linked.png"), &picture));
     assert!(same < 100_000 && other > 500_000, "{same} pixels differ from the link, {other} from the first view");
 }
