@@ -151,7 +151,7 @@ fn wrong_levels_are_refused_before_the_job_begins() {
         ("interval = 1e-6", ["interval = 1e-6 makes about", "give a greater interval, such as "]),
         ("levels = [1, 1.001]", ["too close to each other, 1 and 1.001", "whole multiples of 1"]),
         ("interval = -2", ["line 5", "positive"]),
-        ("levels = [1]\nbase = 2", ["line 5", "belong to interval"]),
+        ("levels = [1]\nbase = 2", ["line 5", "apply to interval alone"]),
         ("index = 5", ["line 5", "interval = 1.0"]),
     ] {
         let job = Job::on(&[&cloud]).with("output.contours", options);

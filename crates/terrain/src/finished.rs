@@ -14,7 +14,7 @@ use tiles::frame::Extras;
 use tiles::gltf::read::{held_bytes, read_extras, read_surface_of};
 
 /// What to do about results that are not as the job wrote them.
-const RUN_AGAIN: &str = "run the job again (gdt-batch verify says what else is wrong)";
+const RUN_AGAIN: &str = "run the job again (gdt-batch verify lists what else is wrong)";
 
 /// The results of a finished job.
 #[derive(Clone, Debug)]

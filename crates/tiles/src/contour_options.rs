@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// The most levels of a terrain.
 pub const MOST_LEVELS: u64 = 100_000;
 
-/// Every so many levels one is an index contour, if the user says nothing.
+/// Every fifth level is an index contour by default.
 const USUAL_INDEX: u32 = 5;
 
 /// `[output.contours]`: the terrain as contour lines.
@@ -28,7 +28,7 @@ pub enum ContourLevels {
     Interval {
         /// The height from one level to the next in source units. It is positive.
         interval: DecimalNumber,
-        /// Every so many levels, counted from the base, one is an index contour; 0 for none.
+        /// The levels from one index contour to the next, of which the base is one; 0 for none.
         index: u32,
         /// The height of a level in source units.
         base: DecimalNumber,
@@ -88,7 +88,7 @@ impl TryFrom<ContourTable> for ContourOptions {
                 ContourLevels::Interval { interval, index: index.unwrap_or(USUAL_INDEX), base }
             }
             (None, Some(value)) if index.is_none() && base.is_none() => ContourLevels::Levels(levels(value)?),
-            (None, Some(_)) => return Err("index and base belong to interval: they say nothing about levels".into()),
+            (None, Some(_)) => return Err("index and base apply to interval alone, not to levels".into()),
             _ => return Err(
                 "contours takes an interval such as interval = 1.0, or levels such as levels = [100.0, 101.5]: one of the two".into(),
             ),
@@ -119,9 +119,8 @@ impl From<ContourOptions> for ContourTable {
 
 fn index(value: &toml::Value) -> Result<u32, String> {
     let number = value.as_integer().and_then(|number| u32::try_from(number).ok());
-    number.ok_or_else(|| {
-        "index says that every so many lines one is an index contour, a whole number such as 5; 0 is none".into()
-    })
+    number
+        .ok_or_else(|| "index is a whole number: with 5, every fifth line is an index contour; with 0, none is".into())
 }
 
 fn base(value: &toml::Value) -> Result<DecimalNumber, String> {
@@ -266,13 +265,13 @@ mod tests {
             ("interval = 0", "positive"),
             ("interval = \"1\"", "positive"),
             ("interval = nan", "positive"),
-            ("interval = 1\nindex = -1", "0 is none"),
-            ("interval = 1\nindex = 2.5", "0 is none"),
+            ("interval = 1\nindex = -1", "with 0, none is"),
+            ("interval = 1\nindex = 2.5", "with 0, none is"),
             ("interval = 1\nbase = inf", "base is"),
             ("levels = []", "[100.0, 101.5]"),
             ("levels = 7", "[100.0, 101.5]"),
             ("levels = [7, 7.0]", "7 is there twice"),
-            ("levels = [7]\nindex = 5", "belong to interval"),
+            ("levels = [7]\nindex = 5", "apply to interval alone"),
             ("interval = 1\nstep = 2", "unknown field `step`"),
         ] {
             let said = options(text).unwrap_err();
