@@ -1,0 +1,110 @@
+//! Joining the pieces of a tile.
+
+use crate::cut::Piece;
+use crate::fill::fill;
+use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, double_area, in_order};
+use std::collections::HashMap;
+
+/// Twice the area of a tile in square steps.
+const WHOLE: i64 = 2 * (LAST as i64) * (LAST as i64);
+
+/// Joins what the terrain has in a tile, and fills the rest of it. Of vertices that share a place the highest stays. `None` if the terrain has no
+/// area there.
+pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
+    let mut corners = [None; 4];
+    for piece in pieces {
+        corners.iter_mut().zip(piece.corners).for_each(|(known, more)| *known = (*known).max(more));
+    }
+    let (nodes, numbers) = joined_nodes(pieces, corners);
+    let (mut all, mut first) = (Vec::new(), 0);
+    for piece in pieces {
+        all.extend(piece.triangles.iter().map(|triangle| triangle.map(|v| numbers[first + v as usize])));
+        first += piece.nodes.len();
+    }
+    let area_of = |triangle: &[u32; 3]| double_area(triangle.map(|v| nodes[v as usize]));
+    let areas: Vec<i64> = all.iter().map(area_of).collect();
+    // What rounding has turned over is covered twice by the triangles around it.
+    let mut kept: Vec<[u32; 3]> =
+        all.iter().zip(&areas).filter(|(_, area)| **area > 0).map(|(triangle, _)| *triangle).collect();
+    if kept.is_empty() {
+        return None;
+    }
+    if areas.iter().sum::<i64>() != WHOLE {
+        kept.extend(fill(&nodes, &outline(&nodes, &all)));
+    }
+    Some(without_unused(nodes, &kept))
+}
+
+/// Returns the vertices of all pieces in order, each place once, and the four corners. Returns the number of each vertex of the pieces among
+/// them too.
+fn joined_nodes(pieces: &[Piece], corners: [Option<i32>; 4]) -> (Vec<Node>, Vec<u32>) {
+    let of_pieces = pieces.iter().flat_map(|piece| piece.nodes.iter().copied());
+    let of_corners = (0..4).map(|corner| {
+        let [u, v] = corner_place(corner);
+        Node { u, v, h: OUTSIDE }
+    });
+    let all: Vec<Node> = of_pieces.chain(of_corners).collect();
+    let mut order: Vec<u64> = (0..).zip(&all).map(|(i, node)| u64::from(node.order()) << 32 | i).collect();
+    order.sort_unstable();
+    let (mut nodes, mut numbers): (Vec<Node>, Vec<u32>) = (Vec::new(), vec![0; all.len()]);
+    let mut last = None;
+    for key in order {
+        let (place, i) = (key >> 32, (key & u64::from(u32::MAX)) as usize);
+        if last != Some(place) {
+            nodes.push(all[i]);
+            last = Some(place);
+        }
+        numbers[i] = (nodes.len() - 1) as u32;
+        if let Some(node) = nodes.last_mut() {
+            node.h = node.h.max(all[i].h);
+        }
+    }
+    for node in &mut nodes {
+        // A crossing may round to a corner that the terrain does not cover: the tiles around it would not know that.
+        if let Some(corner) = node.corner() {
+            node.h = corners[corner].unwrap_or(OUTSIDE);
+        }
+    }
+    (nodes, numbers)
+}
+
+/// Returns the edges at which the terrain ends within the tile, with the terrain on their left.
+fn outline(nodes: &[Node], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let mut counts: HashMap<[u32; 2], i32> = HashMap::new();
+    for &[a, b, c] in triangles {
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            match from < to {
+                true => *counts.entry([from, to]).or_default() += 1,
+                false => *counts.entry([to, from]).or_default() -= 1,
+            }
+        }
+    }
+    let is_on_side = |[a, b]: [u32; 2]| {
+        let (a, b) = (nodes[a as usize], nodes[b as usize]);
+        let same = |a: u16, b: u16| a == b && (a == 0 || a == LAST);
+        same(a.u, b.u) || same(a.v, b.v)
+    };
+    let ends = counts.into_iter().filter(|([a, b], count)| a != b && *count != 0 && !is_on_side([*a, *b]));
+    let mut outline: Vec<[u32; 2]> = ends.map(|([a, b], count)| if count > 0 { [a, b] } else { [b, a] }).collect();
+    outline.sort_unstable();
+    outline
+}
+
+/// Returns the mesh of these triangles, without the vertices that none of them has.
+pub(crate) fn without_unused(nodes: Vec<Node>, triangles: &[[u32; 3]]) -> TileMesh {
+    let mut is_used = vec![false; nodes.len()];
+    triangles.iter().flatten().for_each(|&v| is_used[v as usize] = true);
+    let mut count = 0;
+    let numbers: Vec<u32> = is_used
+        .iter()
+        .map(|used| {
+            count += u32::from(*used);
+            count.saturating_sub(1)
+        })
+        .collect();
+    let nodes: Vec<Node> = nodes.into_iter().zip(&is_used).filter(|(_, used)| **used).map(|(node, _)| node).collect();
+    let triangles: Vec<[u32; 3]> =
+        triangles.iter().map(|triangle| triangle.map(|v| numbers[v as usize])).collect();
+    let triangles = in_order(nodes.len(), &triangles);
+    TileMesh { nodes, triangles }
+}

@@ -1,0 +1,227 @@
+//! The tile above four.
+//!
+//! Its vertices are selected from theirs ([`selection`]), those of its sides from those of their sides alone. So a tile needs no neighbour, and meets
+//! all of them.
+
+use crate::bound::{bound, steps};
+use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, in_order};
+use crate::side::selected_along;
+use crate::tile::Tile;
+use delaunay::geometry::{Bounds, Site};
+use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::triangulation::canonical;
+use selection::{BlockPoints, ErrorBound, PointSource, select};
+use std::collections::BTreeMap;
+
+/// A tile of the next finer zoom.
+#[derive(Clone, Debug, Default)]
+pub struct Child {
+    /// 1 in the east, 0 in the west; 1 in the north, 0 in the south.
+    pub quadrant: [u8; 2],
+    /// Its vertices.
+    pub nodes: Vec<Node>,
+    /// The bound that its vertices were selected by, in steps of height.
+    pub bound: u64,
+}
+
+/// Why there is no coarser tile.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// From the triangulation.
+    #[error(transparent)]
+    Delaunay(#[from] delaunay::Error),
+    /// More vertices were selected than a tile may have.
+    #[error("more vertices than a tile may have")]
+    TooMany,
+}
+
+/// The most vertices of a coarser tile. Where the bound of its zoom would select more, a greater one is taken.
+pub const MOST_VERTICES: u64 = 20_000;
+
+/// The steps of the sides of a square that stand for one metre, or for as much in the other direction.
+const SCALE: i32 = 1024;
+
+/// Tiles of smaller zooms have vertices at least in a grid, so that they follow the curve of the earth.
+const FIRST_FLAT_ZOOM: u8 = 10;
+
+/// Returns the mesh of a tile from the tiles of the next finer zoom in it, and the bound by which its vertices were selected. `outside` is the height of
+/// the surroundings at its zoom.
+///
+/// # Errors
+/// [`BuildError::Delaunay`] if a triangulation was stopped.
+pub fn coarser(tile: Tile, children: &[Child], outside: i32) -> Result<(TileMesh, u64), BuildError> {
+    let candidates = candidates(children);
+    let (on_border, inside): (Vec<Node>, Vec<Node>) = candidates.into_iter().partition(|node| node.is_on_border());
+    let mut fixed = border(&on_border, tile.zoom);
+    fixed.extend(grid(&inside, &fixed, tile.zoom));
+    fixed.sort_unstable_by_key(|node| node.order());
+    fixed.dedup_by_key(|node| node.order());
+    let of_children = children.iter().map(|child| child.bound).max().unwrap_or(0);
+    let mut allowed = steps(tile.zoom).max(of_children);
+    loop {
+        let source = TileSource { tile, fixed: &fixed, inside: &inside, outside, most: MOST_VERTICES.max(2 * fixed.len() as u64) };
+        let bound = if allowed == steps(tile.zoom) { bound(tile.zoom) } else { ErrorBound::new(allowed, 1) };
+        match source.mesh(bound) {
+            Err(BuildError::TooMany) => allowed *= 2,
+            Err(error) => return Err(error),
+            Ok(mesh) => return Ok((mesh, allowed)),
+        }
+    }
+}
+
+/// Returns a tile that the terrain does not reach.
+pub fn flat(tile: Tile) -> Result<TileMesh, BuildError> {
+    coarser(tile, &[], 0).map(|(mesh, _)| mesh)
+}
+
+/// Returns the vertices of the terrain in all children as a tile of the zoom before has them, in order. Of those that come together the highest stays.
+fn candidates(children: &[Child]) -> Vec<Node> {
+    let mut all = Vec::new();
+    for child in children {
+        let along = |steps: u16, half: u8| {
+            let doubled = u32::from(steps) + u32::from(half) * u32::from(LAST);
+            let halved = (doubled / 2) as u16;
+            // Only what lies on the border comes to lie on it.
+            if doubled == 0 || doubled == 2 * u32::from(LAST) { halved } else { halved.clamp(1, LAST - 1) }
+        };
+        let ground = child.nodes.iter().filter(|node| node.h != OUTSIDE);
+        all.extend(ground.map(|node| Node {
+            u: along(node.u, child.quadrant[0]),
+            v: along(node.v, child.quadrant[1]),
+            h: node.h,
+        }));
+    }
+    all.sort_unstable_by_key(|node| (node.order(), std::cmp::Reverse(node.h)));
+    all.dedup_by_key(|node| node.order());
+    all
+}
+
+/// Returns the vertices along the sides: selected ones of `on_border`, and the corners.
+fn border(on_border: &[Node], zoom: u8) -> Vec<Node> {
+    let mut border: Vec<Node> = Vec::new();
+    for corner in 0..4 {
+        let [u, v] = corner_place(corner);
+        let known = on_border.iter().find(|node| node.corner() == Some(corner));
+        border.push(Node { u, v, h: known.map_or(OUTSIDE, |node| node.h) });
+    }
+    for side in 0..4 {
+        let end = if side % 2 == 0 { 0 } else { LAST };
+        let along = |node: &Node| {
+            let (across, along) = if side < 2 { (node.u, node.v) } else { (node.v, node.u) };
+            (across == end).then_some((along, *node))
+        };
+        let mut of_side: Vec<(u16, Node)> = on_border.iter().filter_map(along).collect();
+        of_side.sort_unstable();
+        border.extend(selected_along(&of_side, zoom));
+        let lines = grid_lines(zoom);
+        for line in lines.windows(3) {
+            let is_empty = !of_side.iter().any(|(along, _)| (line[0]..=line[2]).contains(along));
+            let place = if side < 2 { [end, line[1]] } else { [line[1], end] };
+            border.extend(is_empty.then_some(Node { u: place[0], v: place[1], h: OUTSIDE }));
+        }
+    }
+    border
+}
+
+/// Returns where the lines of the grid of a zoom are, with both ends.
+fn grid_lines(zoom: u8) -> Vec<u16> {
+    let count = if zoom < FIRST_FLAT_ZOOM { (32u32 >> (zoom / 2)).max(1) } else { 1 };
+    (0..=count).map(|line| (line * u32::from(LAST) / count) as u16).collect()
+}
+
+/// Returns vertices for the curve of the earth: of each cell of the grid one of the terrain, or where four cells without any meet, one
+/// beside the terrain.
+fn grid(inside: &[Node], border: &[Node], zoom: u8) -> Vec<Node> {
+    let lines = grid_lines(zoom);
+    if lines.len() < 3 {
+        return Vec::new();
+    }
+    let cell = |along: u16| lines.partition_point(|&line| line <= along).clamp(1, lines.len() - 1) - 1;
+    let mut first: BTreeMap<[usize; 2], Node> = BTreeMap::new();
+    for node in inside.iter().chain(border.iter().filter(|node| node.h != OUTSIDE)) {
+        first.entry([cell(node.u), cell(node.v)]).or_insert(*node);
+    }
+    let mut vertices: Vec<Node> = first.values().copied().collect();
+    for i in 1..lines.len() - 1 {
+        for j in 1..lines.len() - 1 {
+            let around = [[i - 1, j - 1], [i, j - 1], [i - 1, j], [i, j]];
+            let is_empty = around.iter().all(|cell| !first.contains_key(cell));
+            vertices.extend(is_empty.then_some(Node { u: lines[i], v: lines[j], h: OUTSIDE }));
+        }
+    }
+    vertices
+}
+
+/// The vertices that a tile may have, as points to select from. Their x is stretched so that both axes have about the same scale on the ground.
+struct TileSource<'a> {
+    tile: Tile,
+    /// Those that it has in any case.
+    fixed: &'a [Node],
+    inside: &'a [Node],
+    outside: i32,
+    /// The most that it may have.
+    most: u64,
+}
+
+impl TileSource<'_> {
+    /// Returns the places in a step along both axes.
+    fn scale(&self) -> [i32; 2] {
+        let cosine = libm::cos(self.tile.middle_latitude());
+        [((f64::from(SCALE) * cosine + 0.5) as i32).clamp(1, SCALE), SCALE]
+    }
+
+    fn point(&self, node: &Node) -> [i32; 3] {
+        let [x, y] = self.scale();
+        [i32::from(node.u) * x, i32::from(node.v) * y, node.height(self.outside)]
+    }
+
+    /// Returns the mesh of the vertices that a bound selects.
+    fn mesh(&self, bound: ErrorBound) -> Result<TileMesh, BuildError> {
+        let selected = select(self, bound)?.sites;
+        let [x, y] = self.scale();
+        let all = Bounds { min: [0, 0], max: [i32::from(LAST) * x, i32::from(LAST) * y] };
+        let mut nodes: Vec<Node> = selected
+            .within(all)
+            .map(|[px, py, h]| Node { u: (px / x) as u16, v: (py / y) as u16, h })
+            .collect();
+        nodes.sort_unstable_by_key(|node| node.order());
+        let sites: Vec<Site> = nodes.iter().map(|node| [i32::from(node.u) * x, i32::from(node.v) * y]).collect();
+        let mesh = canonical(&sites)?;
+        let triangles = in_order(nodes.len(), mesh.corners());
+        // Heights beside the terrain are again those of the surroundings, whatever these are at the next zoom.
+        let outside: Vec<u32> = self.fixed.iter().filter(|node| node.h == OUTSIDE).map(|node| node.order()).collect();
+        nodes.iter_mut().filter(|node| outside.binary_search(&node.order()).is_ok()).for_each(|node| node.h = OUTSIDE);
+        Ok(TileMesh { nodes, triangles })
+    }
+}
+
+impl PointSource for TileSource<'_> {
+    type Error = BuildError;
+
+    fn blocks(&self) -> usize {
+        1
+    }
+
+    fn load(&self, _: usize) -> Result<BlockPoints, BuildError> {
+        let fixed: Vec<[i32; 3]> = self.fixed.iter().map(|node| self.point(node)).collect();
+        let is_fixed = |node: &&Node| self.fixed.binary_search_by_key(&node.order(), |fixed| fixed.order()).is_ok();
+        let inside = self.inside.iter().filter(|node| !is_fixed(node)).map(|node| self.point(node));
+        Ok(BlockPoints { points: inside.chain(fixed.iter().copied()).collect(), fixed })
+    }
+
+    fn triangulate(&self, sites: &[Site]) -> Result<HalfEdgeMesh, BuildError> {
+        Ok(canonical(sites)?)
+    }
+
+    fn keeps_blocks(&self, _: u64, _: u64) -> bool {
+        true
+    }
+
+    fn asks_about(&self, _: [Site; 3]) -> bool {
+        false
+    }
+
+    fn after_round(&self, _: u32, selected: u64) -> Result<(), BuildError> {
+        if selected > self.most { Err(BuildError::TooMany) } else { Ok(()) }
+    }
+}

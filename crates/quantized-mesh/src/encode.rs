@@ -1,0 +1,238 @@
+//! The bytes of a tile: quantized-mesh 1.0, with normals.
+
+use crate::header::{Header, circle, length};
+use crate::mesh::{LAST, Node, TileMesh};
+use crate::normals::{BorderNormal, normals};
+use crate::place::HEIGHT_STEPS;
+use crate::tile::Tile;
+
+/// A step of heights that all tiles of a zoom can be written with: a power of two of the steps of [`Node`]s. Heights on borders are rounded to it, so that
+/// neighbours have the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HeightSteps(i64);
+
+impl HeightSteps {
+    /// Returns the step for tiles whose lowest and highest heights are `range` steps apart, at most.
+    pub fn over(range: u64) -> HeightSteps {
+        let range = i64::try_from(range).unwrap_or(i64::MAX >> 8);
+        HeightSteps(smallest(range))
+    }
+
+    /// Returns the step in metres.
+    pub fn metres(self) -> f64 {
+        self.0 as f64 / HEIGHT_STEPS
+    }
+}
+
+/// Returns the smallest power of two of which so many steps, rounded outwards at both ends, are no more than a tile can have.
+fn smallest(range: i64) -> i64 {
+    let fits = |step: &i64| range + 2 * step <= i64::from(LAST) * step;
+    (0..48).map(|bit| 1 << bit).find(fits).unwrap_or(1 << 48)
+}
+
+/// A tile that is to be written.
+pub struct Surface<'a> {
+    /// The tile.
+    pub tile: Tile,
+    /// Its mesh.
+    pub mesh: &'a TileMesh,
+    /// The height of the surroundings.
+    pub outside: i32,
+    /// What the tiles around it add to the normals on its border, by the columns east and the rows north that they lie.
+    pub around: &'a [([i32; 2], Vec<BorderNormal>)],
+}
+
+/// The number of the extension with normals.
+pub(crate) const NORMALS: u8 = 1;
+
+/// Returns the bytes of a tile.
+pub fn encode(surface: &Surface, steps: HeightSteps) -> Vec<u8> {
+    let Surface { tile, mesh, .. } = *surface;
+    let heights = Heights::new(surface, steps);
+    let order = VertexOrder::new(mesh);
+    let mut bytes = head(tile, heights.metres());
+    let nodes: Vec<Node> = order.vertices.iter().map(|&v| mesh.nodes[v as usize]).collect();
+    bytes.extend((nodes.len() as u32).to_le_bytes());
+    push_differences(&mut bytes, nodes.iter().map(|node| i32::from(node.u)));
+    push_differences(&mut bytes, nodes.iter().map(|node| i32::from(node.v)));
+    push_differences(&mut bytes, order.vertices.iter().map(|&v| heights.quantized(v)));
+    let is_long = nodes.len() > 1 << 16;
+    if is_long {
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+    }
+    bytes.extend((order.triangles.len() as u32).to_le_bytes());
+    let mut push = |number: u32| match is_long {
+        true => bytes.extend(number.to_le_bytes()),
+        false => bytes.extend((number as u16).to_le_bytes()),
+    };
+    let mut highest = 0;
+    for &v in order.triangles.iter().flatten() {
+        push(highest - v);
+        highest += u32::from(v == highest);
+    }
+    push_sides(&mut bytes, &nodes, is_long);
+    let normals = normals(mesh, tile, surface.around);
+    let frame = EarthFrame::new(tile);
+    bytes.push(NORMALS);
+    bytes.extend((2 * nodes.len() as u32).to_le_bytes());
+    for (&v, node) in order.vertices.iter().zip(&nodes) {
+        bytes.extend(octahedral(frame.earth_centred(*node, normals[v as usize])));
+    }
+    bytes
+}
+
+/// The heights of a tile as it has them.
+struct Heights {
+    /// The least, in steps of nodes.
+    least: i64,
+    /// The step, in steps of nodes.
+    step: i64,
+    rounded: Vec<i64>,
+}
+
+impl Heights {
+    fn new(surface: &Surface, HeightSteps(shared): HeightSteps) -> Heights {
+        let height = |node: &Node| i64::from(node.height(surface.outside));
+        let nodes = &surface.mesh.nodes;
+        let (low, high) =
+            nodes.iter().map(height).fold((i64::MAX, i64::MIN), |(low, high), h| (low.min(h), high.max(h)));
+        let least = low.div_euclid(shared) * shared;
+        let step = smallest(high - least).min(shared);
+        let rounded = |node: &Node| {
+            let step = if node.is_on_border() { shared } else { step };
+            (2 * height(node) + step).div_euclid(2 * step) * step
+        };
+        Heights { least, step, rounded: nodes.iter().map(rounded).collect() }
+    }
+
+    /// Returns the heights in metres that the least and the greatest number stand for.
+    fn metres(&self) -> [f64; 2] {
+        [self.least, self.least + i64::from(LAST) * self.step].map(|steps| steps as f64 / HEIGHT_STEPS)
+    }
+
+    fn quantized(&self, vertex: u32) -> i32 {
+        ((self.rounded[vertex as usize] - self.least) / self.step).clamp(0, i64::from(LAST)) as i32
+    }
+}
+
+/// The vertices in the order in which triangles use them first, as the format wants it.
+struct VertexOrder {
+    /// By new number, the old one.
+    vertices: Vec<u32>,
+    /// With new numbers.
+    triangles: Vec<[u32; 3]>,
+}
+
+impl VertexOrder {
+    fn new(mesh: &TileMesh) -> VertexOrder {
+        let (mut numbers, mut vertices) = (vec![u32::MAX; mesh.nodes.len()], Vec::with_capacity(mesh.nodes.len()));
+        let mut number = |v: u32| {
+            let known = &mut numbers[v as usize];
+            if *known == u32::MAX {
+                *known = vertices.len() as u32;
+                vertices.push(v);
+            }
+            *known
+        };
+        let triangles = mesh.triangles.iter().map(|triangle| triangle.map(&mut number)).collect();
+        VertexOrder { vertices, triangles }
+    }
+}
+
+/// Returns the header.
+fn head(tile: Tile, heights: [f64; 2]) -> Vec<u8> {
+    let Header { centre, radius, horizon } = Header::new(tile, heights);
+    let mut bytes = Vec::new();
+    let mut push = |numbers: &[f64]| numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+    push(&centre);
+    let [low, high] = heights.map(|height| (height as f32).to_le_bytes());
+    bytes.extend([low, high].as_flattened());
+    let mut push = |numbers: &[f64]| numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+    push(&centre);
+    push(&[radius]);
+    push(&horizon);
+    bytes
+}
+
+/// Adds each number as the difference to the one before, the sign in the last bit.
+fn push_differences(bytes: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
+    let mut last = 0;
+    for number in numbers {
+        let difference = number - last;
+        last = number;
+        bytes.extend((((difference << 1) ^ (difference >> 31)) as u16).to_le_bytes());
+    }
+}
+
+/// Adds the vertices along the west, south, east and north side, each list in the direction of its axis.
+fn push_sides(bytes: &mut Vec<u8>, nodes: &[Node], is_long: bool) {
+    let sides: [fn(&Node) -> (bool, u16); 4] = [
+        |node| (node.u == 0, node.v),
+        |node| (node.v == 0, node.u),
+        |node| (node.u == LAST, node.v),
+        |node| (node.v == LAST, node.u),
+    ];
+    for side in sides {
+        let along = (0u32..).zip(nodes).filter(|(_, node)| side(node).0).map(|(v, node)| (side(node).1, v));
+        let mut along: Vec<(u16, u32)> = along.collect();
+        along.sort_unstable();
+        bytes.extend((along.len() as u32).to_le_bytes());
+        for (_, v) in along {
+            match is_long {
+                true => bytes.extend(v.to_le_bytes()),
+                false => bytes.extend((v as u16).to_le_bytes()),
+            }
+        }
+    }
+}
+
+/// Tiles of smaller zooms are so wide that directions at their ends do not tell those between.
+const FIRST_SMALL_ZOOM: u8 = 8;
+
+/// East, north and up in a tile, in earth-centred axes.
+struct EarthFrame {
+    tile: Tile,
+    /// Sine and cosine of the longitude in the west and the east, and of the latitude in the south and the north.
+    ends: [[[f64; 2]; 2]; 2],
+}
+
+impl EarthFrame {
+    fn new(tile: Tile) -> EarthFrame {
+        let ends = tile.south_west().map(|low| [circle(low), circle(low + tile.side())]);
+        EarthFrame { tile, ends }
+    }
+
+    /// Returns about sine and cosine of longitude or latitude at a vertex.
+    fn circle(&self, axis: usize, along: u16) -> [f64; 2] {
+        let share = f64::from(along) / f64::from(LAST);
+        if self.tile.zoom < FIRST_SMALL_ZOOM {
+            return circle(self.tile.south_west()[axis] + self.tile.side() * share);
+        }
+        let [low, high] = self.ends[axis];
+        [0, 1].map(|k| low[k] + (high[k] - low[k]) * share)
+    }
+
+    /// Returns the direction of a normal in earth-centred axes, as long as one.
+    fn earth_centred(&self, node: Node, [east, north, up]: [f32; 3]) -> [f64; 3] {
+        let [east, north, up] = [east, north, up].map(f64::from);
+        let length_of = length([east, north, up]);
+        // A vertex beside the terrain has no triangle of it.
+        let [east, north, up] =
+            if length_of > 0.0 { [east, north, up].map(|along| along / length_of) } else { [0.0, 0.0, 1.0] };
+        let ([sin_x, cos_x], [sin_y, cos_y]) = (self.circle(0, node.u), self.circle(1, node.v));
+        let outwards = up * cos_y - north * sin_y;
+        let normal = [outwards * cos_x - east * sin_x, outwards * sin_x + east * cos_x, north * cos_y + up * sin_y];
+        let length = length(normal);
+        normal.map(|along| along / length)
+    }
+}
+
+/// Returns a direction on an unfolded octahedron, in two bytes (Meyer et al. 2010; Cigolle et al. 2014, "A survey of efficient representations for
+/// independent unit vectors").
+fn octahedral([x, y, z]: [f64; 3]) -> [u8; 2] {
+    let sum = x.abs() + y.abs() + z.abs();
+    let [x, y] = [x / sum, y / sum];
+    let sign = |along: f64| if along < 0.0 { -1.0 } else { 1.0 };
+    let folded = if z < 0.0 { [(1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y)] } else { [x, y] };
+    folded.map(|along| ((along.clamp(-1.0, 1.0) * 0.5 + 0.5) * 255.0 + 0.5).floor() as u8)
+}

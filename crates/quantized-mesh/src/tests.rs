@@ -1,0 +1,314 @@
+use crate::mesh::{LAST, corner_place, double_area};
+use crate::*;
+use delaunay::triangulation::canonical;
+use proptest::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read;
+
+/// A terrain on the tiles of zoom 12 around a corner that four of them share.
+struct Terrain {
+    points: Vec<GridPoint>,
+    triangles: Vec<[u32; 3]>,
+}
+
+const ZOOM: u8 = 12;
+const CORNER: [i32; 2] = [4000, 3000];
+
+fn random(seed: u64) -> impl FnMut(i64) -> i64 {
+    let mut state = seed;
+    move |below| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) as i64).rem_euclid(below)
+    }
+}
+
+/// Points on a grid of `cell` steps or anywhere, out to `reach` steps from the corner.
+fn terrain(seed: u64, count: usize, reach: i64, cell: i64) -> Terrain {
+    let mut next = random(seed);
+    let mut places = BTreeMap::new();
+    let mut add = |x: i64, y: i64, z: i64| places.insert([x / cell * cell, y / cell * cell], z as i32);
+    for corner in [[-reach, -reach], [reach, -reach], [-reach, reach], [reach, reach]] {
+        add(corner[0], corner[1], 7);
+    }
+    for _ in 0..count {
+        add(next(2 * reach) - reach, next(2 * reach) - reach, next(200_000));
+    }
+    let points: Vec<GridPoint> = places
+        .iter()
+        .map(|([x, y], z)| GridPoint { x: x + i64::from(CORNER[0]) * SPAN, y: y + i64::from(CORNER[1]) * SPAN, z: *z })
+        .collect();
+    let sites: Vec<[i32; 2]> = places.keys().map(|place| place.map(|along| along as i32)).collect();
+    Terrain { points, triangles: canonical(&sites).unwrap().corners().to_vec() }
+}
+
+/// Cuts a terrain in so many shares, and assembles the tiles.
+fn tiles(terrain: &Terrain, shares: usize) -> BTreeMap<[i32; 2], TileMesh> {
+    let mut pieces: BTreeMap<[i32; 2], Vec<Piece>> = BTreeMap::new();
+    for share in 0..shares {
+        // As other tiles of a job would have them: their own vertices, and triangles in another order.
+        let own = terrain.triangles.iter().skip(share).step_by(shares).rev().copied();
+        let triangles: Vec<[u32; 3]> = own.map(|[a, b, c]| [b, c, a]).collect();
+        for (tile, piece) in cut(&terrain.points, &triangles) {
+            pieces.entry(tile).or_default().insert(0, piece);
+        }
+    }
+    pieces.into_iter().filter_map(|(tile, pieces)| Some((tile, assemble(&pieces)?))).collect()
+}
+
+/// Checks that a mesh covers its tile once, or more where rounding has turned triangles over, and ends at its sides alone.
+fn check_whole(mesh: &TileMesh) {
+    let mut edges: BTreeMap<[u32; 2], i32> = BTreeMap::new();
+    for triangle in &mesh.triangles {
+        assert!(double_area(triangle.map(|v| mesh.nodes[v as usize])) > 0);
+        for k in 0..3 {
+            let [a, b] = [triangle[k], triangle[(k + 1) % 3]];
+            *edges.entry([a.min(b), a.max(b)]).or_default() += if a < b { 1 } else { -1 };
+        }
+    }
+    for ([a, b], count) in edges {
+        let [a, b] = [a, b].map(|v| mesh.nodes[v as usize]);
+        let is_side = |a: u16, b: u16| a == b && (a == 0 || a == LAST);
+        let on_side = is_side(a.u, b.u) || is_side(a.v, b.v);
+        assert_eq!(count != 0, on_side, "{a:?} {b:?} {count}");
+    }
+    for corner in 0..4 {
+        let [u, v] = corner_place(corner);
+        assert_eq!(mesh.nodes.iter().filter(|node| [node.u, node.v] == [u, v]).count(), 1);
+    }
+    let sorted = mesh.nodes.windows(2).all(|pair| pair[0].order() < pair[1].order());
+    assert!(sorted && mesh.triangles.windows(2).all(|pair| pair[0] < pair[1]));
+}
+
+/// The vertices of a side: steps along it, and heights.
+fn side(mesh: &TileMesh, side: usize) -> Vec<[i32; 2]> {
+    let end = if side % 2 == 0 { 0 } else { LAST };
+    let along = |node: &Node| match side < 2 {
+        true => (node.u == end).then_some([i32::from(node.v), node.h]),
+        false => (node.v == end).then_some([i32::from(node.u), node.h]),
+    };
+    let mut along: Vec<[i32; 2]> = mesh.nodes.iter().filter_map(along).collect();
+    along.sort_unstable();
+    along
+}
+
+fn check_meeting(meshes: &BTreeMap<[i32; 2], TileMesh>) {
+    for ([x, y], mesh) in meshes {
+        if let Some(east) = meshes.get(&[x + 1, *y]) {
+            assert_eq!(side(mesh, 1), side(east, 0));
+        }
+        if let Some(north) = meshes.get(&[*x, y + 1]) {
+            assert_eq!(side(mesh, 3), side(north, 2));
+        }
+    }
+}
+
+/// Returns the height of a mesh over a place, of the highest triangle there.
+fn height_over(mesh: &TileMesh, [u, v]: [f64; 2]) -> Option<f64> {
+    let over = |triangle: &[u32; 3]| {
+        let corners = triangle.map(|v| mesh.nodes[v as usize]);
+        if corners.iter().any(|node| node.h == OUTSIDE) {
+            return None;
+        }
+        let [a, b, c] = corners.map(|node| [f64::from(node.u), f64::from(node.v)]);
+        let area = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+        let parts = [area(b, c, [u, v]), area(c, a, [u, v]), area(a, b, [u, v])];
+        let whole = area(a, b, c);
+        let height = (0..3).map(|k| parts[k] * f64::from(corners[k].h)).sum::<f64>() / whole;
+        parts.iter().all(|part| *part >= 0.0).then_some(height)
+    };
+    mesh.triangles.iter().filter_map(over).reduce(f64::max)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+
+    #[test]
+    fn tiles_are_whole_and_meet_and_do_not_depend_on_pieces(
+        seed in 0u64..1 << 40,
+        count in 1usize..400,
+        reach in prop::sample::select(vec![40i64, 3_000, 40_000, 70_000]),
+        cell in prop::sample::select(vec![1i64, 7, SPAN / 2, SPAN]),
+        shares in 1usize..5,
+    ) {
+        let terrain = terrain(seed, count, reach, cell.min(reach));
+        let meshes = tiles(&terrain, 1);
+        meshes.values().for_each(check_whole);
+        check_meeting(&meshes);
+        prop_assert_eq!(tiles(&terrain, shares), meshes);
+    }
+
+    #[test]
+    fn coarser_tiles_meet_and_keep_the_bound(seed in 0u64..1 << 40, count in 1usize..600, reach in 20_000i64..70_000) {
+        let terrain = terrain(seed, count, reach, 1);
+        let mut finer = tiles(&terrain, 1);
+        let leaves = finer.clone();
+        let mut greatest = 0;
+        for zoom in (8..ZOOM).rev() {
+            let mut children: BTreeMap<[i32; 2], Vec<Child>> = BTreeMap::new();
+            for ([x, y], mesh) in &finer {
+                let child = Child { quadrant: [(x & 1) as u8, (y & 1) as u8], nodes: mesh.nodes.clone(), bound: 0 };
+                children.entry([x >> 1, y >> 1]).or_default().push(child);
+            }
+            let make = |(place, children): (&[i32; 2], &Vec<Child>)| {
+                let (mesh, bound) = coarser(Tile { zoom, x: place[0], y: place[1] }, children, 0).unwrap();
+                (*place, mesh, bound)
+            };
+            let made: Vec<_> = children.iter().map(make).collect();
+            greatest += made.iter().map(|(_, _, bound)| *bound).max().unwrap();
+            finer = made.into_iter().map(|(place, mesh, _)| (place, mesh)).collect();
+            finer.values().for_each(check_whole);
+            check_meeting(&finer);
+            // A vertex moves by a step at most on the way to a coarser zoom, so those on slopes are left out of the comparison.
+            let shift = ZOOM - zoom;
+            for ([x, y], leaf) in &leaves {
+                let coarse = &finer[&[x >> shift, y >> shift]];
+                let inner = (1 << shift) - 1;
+                for node in leaf.nodes.iter().filter(|node| node.h != OUTSIDE) {
+                    let along = |axis: i32, steps: u16| {
+                        (f64::from(axis & inner) * f64::from(LAST) + f64::from(steps)) / f64::from(1 << shift)
+                    };
+                    let place = [along(*x, node.u), along(*y, node.v)];
+                    let Some(found) = height_over(coarse, place) else { continue };
+                    let off = (found - f64::from(node.h)).abs();
+                    let slope = 200_000.0 * f64::from(2 * shift) / 20.0;
+                    prop_assert!(off <= greatest as f64 + slope, "{off} {greatest} {slope}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tiles_come_back_from_their_bytes(seed in 0u64..1 << 40, count in 1usize..300, range in 1i64..1 << 20) {
+        let mut terrain = terrain(seed, count, 50_000, 1);
+        terrain.points.iter_mut().for_each(|point| point.z = (i64::from(point.z) * range / 200_000) as i32 - 5_000);
+        let steps = HeightSteps::over(2 * range as u64 + 20_000);
+        for ([x, y], mesh) in tiles(&terrain, 1) {
+            let surface = Surface { tile: Tile { zoom: ZOOM, x, y }, mesh: &mesh, outside: 3, around: &[] };
+            let bytes = encode(&surface, steps);
+            let mut unpacked = Vec::new();
+            flate2::read::GzDecoder::new(&gzip(&bytes)[..]).read_to_end(&mut unpacked).unwrap();
+            prop_assert_eq!(&unpacked, &bytes);
+            let tile = decode(&bytes).unwrap();
+            prop_assert_eq!(tile.vertices.len(), mesh.nodes.len());
+            prop_assert_eq!(tile.normals.len(), mesh.nodes.len());
+            let heights: BTreeMap<[u16; 2], i32> = mesh.nodes.iter().map(|node| ([node.u, node.v], node.height(3))).collect();
+            for (i, [u, v, _]) in tile.vertices.iter().enumerate() {
+                let off = tile.height(i) - f64::from(heights[&[*u, *v]]) / HEIGHT_STEPS;
+                prop_assert!(off.abs() <= steps.metres() / 2.0, "{off} {steps:?}");
+            }
+            let corners = |triangle: &[u32; 3]| {
+                let mut corners = triangle.map(|v| tile.vertices[v as usize]);
+                corners.sort_unstable();
+                corners.map(|[u, v, _]| [u, v])
+            };
+            let found: BTreeSet<_> = tile.triangles.iter().map(corners).collect();
+            let expected: BTreeSet<_> = mesh.triangles.iter().map(|triangle| {
+                let mut corners = triangle.map(|v| [mesh.nodes[v as usize].u, mesh.nodes[v as usize].v]);
+                corners.sort_unstable();
+                corners
+            }).collect();
+            prop_assert_eq!(found, expected);
+            for (k, of_side) in tile.sides.iter().enumerate() {
+                let order = [0, 2, 1, 3][k];
+                prop_assert_eq!(of_side.len(), side(&mesh, order).len());
+            }
+            // No prefix of a tile is one, and none ends in a panic.
+            for end in (0..bytes.len()).step_by(bytes.len() / 50 + 1) {
+                let _ = decode(&bytes[..end]);
+            }
+        }
+    }
+
+    #[test]
+    fn broken_tiles_are_refused(seed in 0u64..1 << 40, changes in 1usize..20) {
+        let terrain = terrain(seed, 30, 50_000, 1);
+        let (place, mesh) = tiles(&terrain, 1).pop_first().unwrap();
+        let surface = Surface { tile: Tile { zoom: ZOOM, x: place[0], y: place[1] }, mesh: &mesh, outside: 0, around: &[] };
+        let mut bytes = encode(&surface, HeightSteps::over(300_000));
+        let mut next = random(seed);
+        for _ in 0..changes {
+            let at = 88 + next(bytes.len() as i64 - 88) as usize;
+            bytes[at] = next(256) as u8;
+        }
+        if let Ok(tile) = decode(&bytes) {
+            let count = tile.vertices.len() as u32;
+            prop_assert!(tile.triangles.iter().flatten().chain(tile.sides.iter().flatten()).all(|v| *v < count));
+        }
+    }
+}
+
+#[test]
+fn all_that_the_finest_tiles_have_is_on_the_triangulation() {
+    let terrain = terrain(5, 500, 60_000, 1);
+    let meshes = tiles(&terrain, 1);
+    for triangle in &terrain.triangles {
+        let corners = triangle.map(|v| terrain.points[v as usize]);
+        let mean = |of: fn(&GridPoint) -> i64| corners.iter().map(|corner| of(corner) as f64).sum::<f64>() / 3.0;
+        let [x, y, z] = [mean(|p| p.x), mean(|p| p.y), mean(|p| p.z.into())];
+        let tile = [x, y].map(|along| (along / SPAN as f64).floor());
+        let place = [x - tile[0] * SPAN as f64, y - tile[1] * SPAN as f64];
+        let found = height_over(&meshes[&tile.map(|number| number as i32)], place).unwrap();
+        // A crossing is rounded to a step, which is some height on a slope.
+        assert!((found - z).abs() < 4_000.0, "{found} {z}");
+    }
+}
+
+#[test]
+fn neighbours_have_the_same_normals() {
+    let terrain = terrain(9, 300, 60_000, 1);
+    let meshes = tiles(&terrain, 1);
+    let tile = |[x, y]: [i32; 2]| Tile { zoom: ZOOM, x, y };
+    let normals_of = |place: [i32; 2]| {
+        let others = (-1..=1).flat_map(|y| (-1..=1).map(move |x| [x, y])).filter(|offset| *offset != [0, 0]);
+        let around: Vec<([i32; 2], Vec<BorderNormal>)> = others
+            .filter_map(|[x, y]| {
+                let beside = [place[0] + x, place[1] + y];
+                Some(([x, y], border_normals(meshes.get(&beside)?, tile(beside))))
+            })
+            .collect();
+        let normals = crate::normals::normals(&meshes[&place], tile(place), &around);
+        let nodes = meshes[&place].nodes.iter().map(|node| [node.u, node.v]);
+        nodes.zip(normals).collect::<BTreeMap<_, _>>()
+    };
+    let (west, east) = (normals_of([CORNER[0] - 1, CORNER[1]]), normals_of(CORNER));
+    let along: Vec<u16> = west.keys().filter(|place| place[0] == LAST).map(|place| place[1]).collect();
+    assert!(along.len() > 10);
+    assert!(along.iter().all(|v| west[&[LAST, *v]] == east[&[0, *v]]));
+}
+
+#[test]
+fn a_tile_beside_the_terrain_follows_the_curve_of_the_earth() {
+    let mesh = flat(Tile { zoom: 0, x: 1, y: 0 }).unwrap();
+    check_whole(&mesh);
+    assert_eq!(mesh.nodes.len(), 33 * 33);
+    assert!(mesh.nodes.iter().all(|node| node.h == OUTSIDE));
+}
+
+#[test]
+fn the_list_names_each_tile_once() {
+    let mut next = random(3);
+    let tiles: Vec<Tile> = (0..200).map(|_| Tile { zoom: 5, x: next(20) as i32 - 10, y: next(12) as i32 }).collect();
+    let about = LayerAbout { bounds: [0.0; 4], attribution: Some("(c) Example") };
+    let text = layer(&[ZoomTiles::new(&tiles)], &about);
+    let list: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(list["attribution"], "(c) Example");
+    let mut found = Vec::new();
+    for rectangle in list["available"][0].as_array().unwrap() {
+        let number = |key: &str| rectangle[key].as_i64().unwrap() as i32;
+        for y in number("startY")..=number("endY") {
+            found.extend((number("startX")..=number("endX")).map(|x| [y, x]));
+        }
+    }
+    let expected: BTreeSet<[i32; 2]> = tiles.iter().map(|tile| [tile.y, tile.column()]).collect();
+    assert_eq!(found.len(), expected.len());
+    assert_eq!(found.into_iter().collect::<BTreeSet<_>>(), expected);
+}
+
+#[test]
+fn the_finest_zoom_follows_the_density() {
+    // Four points a square metre: tiles of 76 m have 23,000 of them, those of 38 m 6,000.
+    assert_eq!(finest_zoom(1e6, 4_000_000, 0.0), 19);
+    assert_eq!(finest_zoom(1e6, 2_000_000, 0.0), 18);
+    assert_eq!(finest_zoom(1e6, 2_000_000, 1.2), 18);
+    assert_eq!(finest_zoom(0.0, 0, 0.0), MOST_ZOOM);
+}
