@@ -40,6 +40,7 @@ fn needed_keys(table: &str) -> Table {
         "[output]" => Some(("directory", "a".into())),
         "[output.contours]" => Some(("interval", Value::Float(1.0))),
         "[output.raster]" => Some(("resolution", Value::Float(1.0))),
+        "[output.terrain]" => Some(("format", "quantized-mesh".into())),
         _ => None,
     };
     needed.into_iter().map(|(key, value)| (key.to_string(), value)).collect()

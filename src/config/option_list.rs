@@ -195,6 +195,7 @@ mod tests {
             "[output]",
             "[output.raster]",
             "[output.contours]",
+            "[output.terrain]",
             "[limits]",
         ];
         assert_eq!(super::tables(), tables);

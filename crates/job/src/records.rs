@@ -54,6 +54,8 @@ pub enum JobStep {
     Exports,
     /// Writes the contour lines.
     Contours,
+    /// Writes the terrain tiles for globes.
+    Terrain,
     /// Writes the inputs with the classes that the job has found.
     Classified,
     /// Writes what is beside the tiles, except the raster, the contour lines and the report.

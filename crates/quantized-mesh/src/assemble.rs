@@ -1,8 +1,9 @@
 //! Joining the pieces of a tile.
 
 use crate::cut::Piece;
-use crate::fill::fill;
+use crate::fill::{fill, planar};
 use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, double_area, in_order};
+use crate::unfold::unfolded;
 use std::collections::HashMap;
 
 /// Twice the area of a tile in square steps.
@@ -22,15 +23,18 @@ pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
         first += piece.nodes.len();
     }
     let area_of = |triangle: &[u32; 3]| double_area(triangle.map(|v| nodes[v as usize]));
-    let areas: Vec<i64> = all.iter().map(area_of).collect();
-    // What rounding has turned over is covered twice by the triangles around it.
-    let mut kept: Vec<[u32; 3]> =
-        all.iter().zip(&areas).filter(|(_, area)| **area > 0).map(|(triangle, _)| *triangle).collect();
+    // Triangles that rounding has turned over have negative areas, so that the sum is that of the terrain.
+    let area: i64 = all.iter().map(area_of).sum();
+    let around = if area == WHOLE { Vec::new() } else { ends(&all) };
+    let (mut kept, is_unfolded) = unfolded(&nodes, all);
     if kept.is_empty() {
         return None;
     }
-    if areas.iter().sum::<i64>() != WHOLE {
-        kept.extend(fill(&nodes, &outline(&nodes, &all)));
+    if !is_unfolded || !has_all_on_border(&nodes, &kept) {
+        kept = planar(&nodes, &kept);
+    } else if area != WHOLE {
+        let inner: Vec<[u32; 2]> = ends(&kept).into_iter().filter(|edge| !is_on_side(&nodes, *edge)).collect();
+        kept.extend(fill(&nodes, &inner, &around));
     }
     Some(without_unused(nodes, &kept))
 }
@@ -68,8 +72,15 @@ fn joined_nodes(pieces: &[Piece], corners: [Option<i32>; 4]) -> (Vec<Node>, Vec<
     (nodes, numbers)
 }
 
-/// Returns the edges at which the terrain ends within the tile, with the terrain on their left.
-fn outline(nodes: &[Node], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+/// Tells whether triangles have all vertices on the border of the tile but its corners.
+fn has_all_on_border(nodes: &[Node], triangles: &[[u32; 3]]) -> bool {
+    let mut is_used: Vec<bool> = nodes.iter().map(|node| !node.is_on_border() || node.corner().is_some()).collect();
+    triangles.iter().flatten().for_each(|&v| is_used[v as usize] = true);
+    is_used.into_iter().all(|used| used)
+}
+
+/// Returns the edges that only one of the triangles has, or more on one side than on the other, in order and with the triangles on their left.
+fn ends(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
     let mut counts: HashMap<[u32; 2], i32> = HashMap::new();
     for &[a, b, c] in triangles {
         for [from, to] in [[a, b], [b, c], [c, a]] {
@@ -79,15 +90,17 @@ fn outline(nodes: &[Node], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
             }
         }
     }
-    let is_on_side = |[a, b]: [u32; 2]| {
-        let (a, b) = (nodes[a as usize], nodes[b as usize]);
-        let same = |a: u16, b: u16| a == b && (a == 0 || a == LAST);
-        same(a.u, b.u) || same(a.v, b.v)
-    };
-    let ends = counts.into_iter().filter(|([a, b], count)| a != b && *count != 0 && !is_on_side([*a, *b]));
-    let mut outline: Vec<[u32; 2]> = ends.map(|([a, b], count)| if count > 0 { [a, b] } else { [b, a] }).collect();
-    outline.sort_unstable();
-    outline
+    let ends = counts.into_iter().filter(|([a, b], count)| a != b && *count != 0);
+    let mut ends: Vec<[u32; 2]> = ends.map(|([a, b], count)| if count > 0 { [a, b] } else { [b, a] }).collect();
+    ends.sort_unstable();
+    ends
+}
+
+/// Tells whether an edge lies on a side of the tile.
+fn is_on_side(nodes: &[Node], edge: [u32; 2]) -> bool {
+    let [a, b] = edge.map(|v| nodes[v as usize]);
+    let same = |a: u16, b: u16| a == b && (a == 0 || a == LAST);
+    same(a.u, b.u) || same(a.v, b.v)
 }
 
 /// Returns the mesh of these triangles, without the vertices that none of them has.
@@ -103,8 +116,7 @@ pub(crate) fn without_unused(nodes: Vec<Node>, triangles: &[[u32; 3]]) -> TileMe
         })
         .collect();
     let nodes: Vec<Node> = nodes.into_iter().zip(&is_used).filter(|(_, used)| **used).map(|(node, _)| node).collect();
-    let triangles: Vec<[u32; 3]> =
-        triangles.iter().map(|triangle| triangle.map(|v| numbers[v as usize])).collect();
+    let triangles: Vec<[u32; 3]> = triangles.iter().map(|triangle| triangle.map(|v| numbers[v as usize])).collect();
     let triangles = in_order(nodes.len(), &triangles);
     TileMesh { nodes, triangles }
 }

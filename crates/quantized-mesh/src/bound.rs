@@ -1,22 +1,16 @@
 //! How close the tiles of a zoom are to the triangulation.
 
 use crate::place::{HEIGHT_STEPS, MOST_ZOOM};
-use selection::ErrorBound;
 
 /// The error in metres that viewers expect of zoom 0; that of each next zoom is half of the one before. CesiumJS estimates it so: the length of
 /// the equator, divided by 2 tiles of 64 cells, a quarter of that.
 pub const LEVEL_ZERO_ERROR: f64 = 77_067.339_6;
 
-/// The part of the expected error that one step to a coarser zoom may add. All finer zooms together add as much again, so that a tile keeps half of
-/// the expected error: a pixel where viewers allow two.
+/// The part of the expected error that one step to a coarser zoom may add. All finer zooms together may add about as much again: a pixel where viewers
+/// allow two.
 const SHARE: f64 = 0.25;
 
 /// Returns the bound that the vertices of a zoom are selected by, in steps of height.
-pub fn bound(zoom: u8) -> ErrorBound {
-    ErrorBound::new(steps(zoom), 1)
-}
-
-/// Returns [`bound`] as a number of steps.
 pub(crate) fn steps(zoom: u8) -> u64 {
     (LEVEL_ZERO_ERROR * SHARE * HEIGHT_STEPS) as u64 >> zoom
 }
@@ -35,5 +29,5 @@ pub fn finest_zoom(area: f64, vertices: u64, latitude: f64) -> u8 {
         let side = HALF_MERIDIAN / f64::from(1u32 << zoom);
         side * side * libm::cos(latitude) <= per_vertex * VERTICES_PER_TILE
     };
-    (0..MOST_ZOOM).find(fits).unwrap_or(MOST_ZOOM)
+    (1..MOST_ZOOM).find(fits).unwrap_or(MOST_ZOOM)
 }

@@ -3,14 +3,15 @@
 //! Its vertices are selected from theirs ([`selection`]), those of its sides from those of their sides alone. So a tile needs no neighbour, and meets
 //! all of them.
 
-use crate::bound::{bound, steps};
+use crate::bound::steps;
 use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, in_order};
+use crate::rough::Cells;
 use crate::side::selected_along;
 use crate::tile::Tile;
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::triangulation::canonical;
-use selection::{BlockPoints, ErrorBound, PointSource, select};
+use selection::{BlockPoints, ErrorBound, PointSource, select_down};
 use std::collections::BTreeMap;
 
 /// A tile of the next finer zoom.
@@ -20,23 +21,10 @@ pub struct Child {
     pub quadrant: [u8; 2],
     /// Its vertices.
     pub nodes: Vec<Node>,
-    /// The bound that its vertices were selected by, in steps of height.
-    pub bound: u64,
 }
 
-/// Why there is no coarser tile.
-#[derive(Debug, thiserror::Error)]
-pub enum BuildError {
-    /// From the triangulation.
-    #[error(transparent)]
-    Delaunay(#[from] delaunay::Error),
-    /// More vertices were selected than a tile may have.
-    #[error("more vertices than a tile may have")]
-    TooMany,
-}
-
-/// The most vertices of a coarser tile. Where the bound of its zoom would select more, a greater one is taken.
-pub const MOST_VERTICES: u64 = 20_000;
+/// The most vertices of a coarser tile, besides those along its sides. Where the bound of its zoom would select more, as in woods, a greater one holds.
+const MOST_VERTICES: u64 = 16_384;
 
 /// The steps of the sides of a square that stand for one metre, or for as much in the other direction.
 const SCALE: i32 = 1024;
@@ -48,29 +36,21 @@ const FIRST_FLAT_ZOOM: u8 = 10;
 /// the surroundings at its zoom.
 ///
 /// # Errors
-/// [`BuildError::Delaunay`] if a triangulation was stopped.
-pub fn coarser(tile: Tile, children: &[Child], outside: i32) -> Result<(TileMesh, u64), BuildError> {
+/// [`delaunay::Error::Stopped`].
+pub fn coarser(tile: Tile, children: &[Child], outside: i32) -> Result<(TileMesh, u64), delaunay::Error> {
     let candidates = candidates(children);
     let (on_border, inside): (Vec<Node>, Vec<Node>) = candidates.into_iter().partition(|node| node.is_on_border());
     let mut fixed = border(&on_border, tile.zoom);
     fixed.extend(grid(&inside, &fixed, tile.zoom));
     fixed.sort_unstable_by_key(|node| node.order());
     fixed.dedup_by_key(|node| node.order());
-    let of_children = children.iter().map(|child| child.bound).max().unwrap_or(0);
-    let mut allowed = steps(tile.zoom).max(of_children);
-    loop {
-        let source = TileSource { tile, fixed: &fixed, inside: &inside, outside, most: MOST_VERTICES.max(2 * fixed.len() as u64) };
-        let bound = if allowed == steps(tile.zoom) { bound(tile.zoom) } else { ErrorBound::new(allowed, 1) };
-        match source.mesh(bound) {
-            Err(BuildError::TooMany) => allowed *= 2,
-            Err(error) => return Err(error),
-            Ok(mesh) => return Ok((mesh, allowed)),
-        }
-    }
+    let source = TileSource { tile, fixed: &fixed, inside: &inside, outside };
+    let (vertices, bound) = source.vertices()?;
+    Ok((source.mesh_of(vertices)?, bound))
 }
 
 /// Returns a tile that the terrain does not reach.
-pub fn flat(tile: Tile) -> Result<TileMesh, BuildError> {
+pub fn flat(tile: Tile) -> Result<TileMesh, delaunay::Error> {
     coarser(tile, &[], 0).map(|(mesh, _)| mesh)
 }
 
@@ -159,8 +139,6 @@ struct TileSource<'a> {
     fixed: &'a [Node],
     inside: &'a [Node],
     outside: i32,
-    /// The most that it may have.
-    most: u64,
 }
 
 impl TileSource<'_> {
@@ -175,16 +153,53 @@ impl TileSource<'_> {
         [i32::from(node.u) * x, i32::from(node.v) * y, node.height(self.outside)]
     }
 
-    /// Returns the mesh of the vertices that a bound selects.
-    fn mesh(&self, bound: ErrorBound) -> Result<TileMesh, BuildError> {
-        let selected = select(self, bound)?.sites;
+    /// Returns the vertices of the tile, and their bound.
+    fn vertices(&self) -> Result<(Vec<Node>, u64), delaunay::Error> {
+        match self.medians() {
+            Some(medians) => Ok((medians, self.range())),
+            None => self.selected(),
+        }
+    }
+
+    /// Returns a vertex for each cell of the tile, and the fixed ones, where the surface is so rough that the bound would select far more vertices than a
+    /// tile may have.
+    fn medians(&self) -> Option<Vec<Node>> {
+        if self.inside.len() as u64 <= MOST_VERTICES {
+            return None;
+        }
+        let cells = Cells::new(self.inside);
+        let is_rough = cells.off_plane(2 * steps(self.tile.zoom)) as u64 > MOST_VERTICES / 2;
+        is_rough.then(|| {
+            let mut medians = cells.medians();
+            medians.retain(|node| !self.is_fixed(node));
+            medians.extend(self.fixed);
+            medians
+        })
+    }
+
+    /// Returns the vertices that the bound of the zoom selects, or a greater one if these would be too many.
+    fn selected(&self) -> Result<(Vec<Node>, u64), delaunay::Error> {
+        let ladder = self.ladder();
+        let bounds: Vec<ErrorBound> = ladder.iter().map(|&steps| ErrorBound::new(steps, 1)).collect();
+        let (selected, kept) = select_down(self, &bounds, MOST_VERTICES)?;
+        let kept = ladder.iter().zip(&bounds).find(|(_, bound)| Some(**bound) == kept).map(|(steps, _)| *steps);
         let [x, y] = self.scale();
         let all = Bounds { min: [0, 0], max: [i32::from(LAST) * x, i32::from(LAST) * y] };
-        let mut nodes: Vec<Node> = selected
-            .within(all)
-            .map(|[px, py, h]| Node { u: (px / x) as u16, v: (py / y) as u16, h })
-            .collect();
+        let nodes =
+            selected.within(all).map(|[px, py, h]| Node { u: (px / x) as u16, v: (py / y) as u16, h }).collect();
+        Ok((nodes, kept.unwrap_or_else(|| self.range())))
+    }
+
+    fn is_fixed(&self, node: &Node) -> bool {
+        // Without a grid all fixed vertices lie on the border.
+        self.tile.zoom < FIRST_FLAT_ZOOM
+            && self.fixed.binary_search_by_key(&node.order(), |fixed| fixed.order()).is_ok()
+    }
+
+    /// Returns the mesh of vertices.
+    fn mesh_of(&self, mut nodes: Vec<Node>) -> Result<TileMesh, delaunay::Error> {
         nodes.sort_unstable_by_key(|node| node.order());
+        let [x, y] = self.scale();
         let sites: Vec<Site> = nodes.iter().map(|node| [i32::from(node.u) * x, i32::from(node.v) * y]).collect();
         let mesh = canonical(&sites)?;
         let triangles = in_order(nodes.len(), mesh.corners());
@@ -193,23 +208,43 @@ impl TileSource<'_> {
         nodes.iter_mut().filter(|node| outside.binary_search(&node.order()).is_ok()).for_each(|node| node.h = OUTSIDE);
         Ok(TileMesh { nodes, triangles })
     }
+
+    /// Returns the lowest and the highest height apart.
+    fn range(&self) -> u64 {
+        let heights = self.fixed.iter().chain(self.inside).map(|node| node.height(self.outside));
+        let [low, high] = heights.fold([i32::MAX, i32::MIN], |[low, high], h| [low.min(h), high.max(h)]);
+        if low > high { 0 } else { high.abs_diff(low).into() }
+    }
+
+    /// Returns bounds from one that few vertices exceed down to that of the zoom, in steps.
+    fn ladder(&self) -> Vec<u64> {
+        const FACTOR: u64 = 4;
+        let (last, range) = (steps(self.tile.zoom).max(1), self.range());
+        let mut ladder: Vec<u64> = std::iter::successors(Some(last), |bound| Some(bound * FACTOR))
+            .take_while(|bound| *bound < range / FACTOR)
+            .collect();
+        if ladder.is_empty() {
+            ladder.push(last);
+        }
+        ladder.reverse();
+        ladder
+    }
 }
 
 impl PointSource for TileSource<'_> {
-    type Error = BuildError;
+    type Error = delaunay::Error;
 
     fn blocks(&self) -> usize {
         1
     }
 
-    fn load(&self, _: usize) -> Result<BlockPoints, BuildError> {
+    fn load(&self, _: usize) -> Result<BlockPoints, delaunay::Error> {
         let fixed: Vec<[i32; 3]> = self.fixed.iter().map(|node| self.point(node)).collect();
-        let is_fixed = |node: &&Node| self.fixed.binary_search_by_key(&node.order(), |fixed| fixed.order()).is_ok();
-        let inside = self.inside.iter().filter(|node| !is_fixed(node)).map(|node| self.point(node));
+        let inside = self.inside.iter().filter(|node| !self.is_fixed(node)).map(|node| self.point(node));
         Ok(BlockPoints { points: inside.chain(fixed.iter().copied()).collect(), fixed })
     }
 
-    fn triangulate(&self, sites: &[Site]) -> Result<HalfEdgeMesh, BuildError> {
+    fn triangulate(&self, sites: &[Site]) -> Result<HalfEdgeMesh, delaunay::Error> {
         Ok(canonical(sites)?)
     }
 
@@ -221,7 +256,7 @@ impl PointSource for TileSource<'_> {
         false
     }
 
-    fn after_round(&self, _: u32, selected: u64) -> Result<(), BuildError> {
-        if selected > self.most { Err(BuildError::TooMany) } else { Ok(()) }
+    fn after_round(&self, _: u32, _: u64) -> Result<(), delaunay::Error> {
+        Ok(())
     }
 }

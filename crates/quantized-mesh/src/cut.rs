@@ -104,6 +104,49 @@ impl Cutter<'_> {
                 self.clip_to([x, y], corners);
             }
         }
+        corners.iter().for_each(|corner| self.add_on_border(corner));
+        self.add_over_corners(corners);
+    }
+
+    /// Adds the heights of a triangle over corners of tiles to all tiles around these, also to those that it only touches.
+    fn add_over_corners(&mut self, corners: [GridPoint; 3]) {
+        let lines = |axis: usize| {
+            let along = corners.map(|corner| corner.along(axis));
+            let (low, high) = (along[0].min(along[1]).min(along[2]), along[0].max(along[1]).max(along[2]));
+            (low + SPAN - 1).div_euclid(SPAN) as i32..=high.div_euclid(SPAN) as i32
+        };
+        for x in lines(0) {
+            for y in lines(1) {
+                let Some(height) = Clip::new([x, y], corners).height_over_south_west() else { continue };
+                for corner in 0..4 {
+                    let tile = [x - (corner & 1), y - (corner >> 1)];
+                    let number = self.piece(tile);
+                    let known = &mut self.pieces[number].1.corners[corner as usize];
+                    *known = (*known).max(Some(height));
+                }
+            }
+        }
+    }
+
+    /// Adds a vertex on the border of tiles to all of them, also to those that none of its triangles lies in.
+    fn add_on_border(&mut self, point: &GridPoint) {
+        let numbers = |along: i64| {
+            let last = along.div_euclid(SPAN) as i32;
+            if along % SPAN == 0 { last - 1..=last } else { last..=last }
+        };
+        if point.x % SPAN != 0 && point.y % SPAN != 0 {
+            return;
+        }
+        for x in numbers(point.x) {
+            for y in numbers(point.y) {
+                let (number, node) = (self.piece([x, y]), node([x, y], point));
+                let piece = &mut self.pieces[number].1;
+                piece.nodes.push(node);
+                if let Some(corner) = node.corner() {
+                    piece.corners[corner] = piece.corners[corner].max(Some(node.h));
+                }
+            }
+        }
     }
 
     fn clip_to(&mut self, tile: [i32; 2], corners: [GridPoint; 3]) {
@@ -123,9 +166,6 @@ impl Cutter<'_> {
         let triangle = |i: u32| [fan, (fan + i) % len, (fan + i + 1) % len].map(|i| first + i);
         let turned = |[a, b, c]: [u32; 3]| if clip.is_turned { [a, c, b] } else { [a, b, c] };
         piece.triangles.extend((1..len - 1).map(triangle).map(turned));
-        for (corner, known) in piece.corners.iter_mut().enumerate() {
-            *known = (*known).max(clip.height_over_corner(corner));
-        }
     }
 }
 
@@ -242,9 +282,9 @@ impl Clip {
         }
     }
 
-    /// Returns the height of the triangle over a corner of the tile, if it reaches there.
-    fn height_over_corner(&self, corner: usize) -> Option<i32> {
-        let place = [self.sides[corner & 1], self.sides[2 + (corner >> 1)]];
+    /// Returns the height of the triangle over the south-west corner of the tile, if it reaches there.
+    fn height_over_south_west(&self) -> Option<i32> {
+        let place = [self.sides[0], self.sides[2]];
         let [a, b, c] = self.corners.map(|corner| [corner.x, corner.y]);
         let is_within = [(a, b), (b, c), (c, a)].iter().all(|&(from, to)| orient(from, to, place) >= 0);
         (self.area > 0 && is_within).then(|| self.height_at(place))

@@ -1,9 +1,9 @@
-//! Triangles between the outline of the terrain and the border of its tile.
+//! Triangles between the edge of the terrain and the border of its tile.
 
 use crate::mesh::Node;
-use spade::handles::{DirectedEdgeHandle, FixedFaceHandle, FixedVertexHandle, InnerTag};
-use spade::{CdtEdge, ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
-use std::collections::{BTreeMap, HashSet};
+use spade::handles::FixedVertexHandle;
+use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+use std::collections::BTreeMap;
 
 /// A vertex with its number.
 struct Vertex {
@@ -19,14 +19,30 @@ impl HasPosition for Vertex {
     }
 }
 
-type Plane = ConstrainedDelaunayTriangulation<Vertex>;
-
-/// Returns triangles beside the terrain, which lies on the left of the edges of its outline within the tile.
-pub(crate) fn fill(nodes: &[Node], outline: &[[u32; 2]]) -> Vec<[u32; 3]> {
+/// Returns triangles beside the terrain. `inner` are the edges that they share with it, and `around` are the edges around all of the terrain in the
+/// tile, with the terrain on their left.
+pub(crate) fn fill(nodes: &[Node], inner: &[[u32; 2]], around: &[[u32; 2]]) -> Vec<[u32; 3]> {
     let corners = (0..).zip(nodes).filter(|(_, node)| node.corner().is_some()).map(|(v, _)| v);
-    let mut plane = Plane::new();
+    let vertices = corners.chain(inner.iter().flatten().copied());
+    let mut faces = faces(nodes, vertices, inner);
+    faces.retain(|face| !is_terrain(nodes, *face, around));
+    faces
+}
+
+/// Returns triangles between all vertices of a tile that have as many as possible of the edges of `triangles`.
+pub(crate) fn planar(nodes: &[Node], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let mut edges: Vec<[u32; 2]> = edges.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    faces(nodes, 0..nodes.len() as u32, &edges)
+}
+
+/// Returns the constrained Delaunay triangulation of some vertices. Rounding may let two of the edges cross: the first is one of it then.
+fn faces(nodes: &[Node], vertices: impl Iterator<Item = u32>, edges: &[[u32; 2]]) -> Vec<[u32; 3]> {
+    let mut plane = ConstrainedDelaunayTriangulation::<Vertex>::new();
     let mut handles: BTreeMap<u32, FixedVertexHandle> = BTreeMap::new();
-    for v in corners.chain(outline.iter().flatten().copied()) {
+    for v in vertices {
         let place = nodes[v as usize];
         let vertex = Vertex { place: Point2::new(f64::from(place.u), f64::from(place.v)), number: v };
         if !handles.contains_key(&v)
@@ -35,56 +51,30 @@ pub(crate) fn fill(nodes: &[Node], outline: &[[u32; 2]]) -> Vec<[u32; 3]> {
             handles.insert(v, handle);
         }
     }
-    for edge in outline {
-        // Rounding may let two edges of an outline cross. One of them is no border then.
+    for edge in edges {
         if let [Some(&from), Some(&to)] = edge.map(|v| handles.get(&v))
             && plane.can_add_constraint(from, to)
         {
             plane.add_constraint(from, to);
         }
     }
-    let ends = outline.iter().filter_map(|edge| Some([*handles.get(&edge[0])?, *handles.get(&edge[1])?]));
-    let beside: Vec<FixedFaceHandle<InnerTag>> = ends.flat_map(|ends| faces_on_the_right(&plane, ends)).collect();
-    reached(&plane, beside)
+    plane.inner_faces().map(|face| face.vertices().map(|vertex| vertex.data().number)).collect()
 }
 
-/// An edge of the plane.
-type PlaneEdge<'a> = DirectedEdgeHandle<'a, Vertex, (), CdtEdge<()>, ()>;
-
-/// Returns the faces on the right of the way from one vertex to another, along edges that no other vertex divides, or several do.
-fn faces_on_the_right(plane: &Plane, [from, to]: [FixedVertexHandle; 2]) -> Vec<FixedFaceHandle<InnerTag>> {
-    let goal = plane.vertex(to).position();
-    let (mut at, mut faces) = (plane.vertex(from), Vec::new());
-    while at.fix() != to {
-        let start = at.position();
-        let way = |edge: &PlaneEdge| {
-            let end = edge.to().position();
-            let ([dx, dy], [gx, gy]) = ([end.x - start.x, end.y - start.y], [goal.x - start.x, goal.y - start.y]);
-            edge.is_constraint_edge() && dx * gy == dy * gx && dx * gx + dy * gy > 0.0
-        };
-        let Some(edge) = at.out_edges().find(way) else { break };
-        faces.extend(edge.rev().face().as_inner().map(|face| face.fix()));
-        at = edge.to();
+/// Tells whether the terrain lies in the middle of a triangle: whether the edges around it go around that.
+fn is_terrain(nodes: &[Node], triangle: [u32; 3], around: &[[u32; 2]]) -> bool {
+    let place = |v: u32| {
+        let node = nodes[v as usize];
+        [node.u, node.v].map(i64::from)
+    };
+    let corners = triangle.map(place);
+    // Three times its middle is a whole number.
+    let [x, y] = [0, 1].map(|axis: usize| corners.iter().map(|corner| corner[axis]).sum::<i64>());
+    let mut turns = 0;
+    for edge in around {
+        let [from, to] = edge.map(|v| place(v).map(|along| 3 * along));
+        let side = (to[0] - from[0]) * (y - from[1]) - (to[1] - from[1]) * (x - from[0]);
+        turns += i32::from(from[1] <= y && y < to[1] && side > 0) - i32::from(to[1] <= y && y < from[1] && side < 0);
     }
-    faces
-}
-
-/// Returns the triangles of all faces that are reached from some without crossing an outline.
-fn reached(plane: &Plane, mut open: Vec<FixedFaceHandle<InnerTag>>) -> Vec<[u32; 3]> {
-    let mut seen: HashSet<FixedFaceHandle<InnerTag>> = open.iter().copied().collect();
-    open = seen.iter().copied().collect();
-    let mut triangles = Vec::new();
-    while let Some(face) = open.pop() {
-        let face = plane.face(face);
-        triangles.push(face.vertices().map(|vertex| vertex.data().number));
-        for edge in face.adjacent_edges() {
-            let beside = edge.rev().face().as_inner().map(|face| face.fix());
-            if let Some(beside) = beside.filter(|_| !edge.is_constraint_edge())
-                && seen.insert(beside)
-            {
-                open.push(beside);
-            }
-        }
-    }
-    triangles
+    turns > 0
 }

@@ -3,7 +3,7 @@
 use miniz_oxide::deflate::compress_to_vec;
 
 /// The effort of the coder.
-const LEVEL: u8 = 3;
+const LEVEL: u8 = 1;
 
 /// The header: DEFLATE, no name, no time, an unknown system.
 const HEADER: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];

@@ -52,9 +52,7 @@ pub struct LayerAbout<'a> {
 
 /// Returns the list of the tiles of all zooms, from 0 on.
 pub fn layer(zooms: &[ZoomTiles], about: &LayerAbout) -> String {
-    let rectangle = |[[west, east], [south, north]]: [[i32; 2]; 2]| {
-        json!({ "startX": west, "startY": south, "endX": east, "endY": north })
-    };
+    let rectangle = |[[west, east], [south, north]]: [[i32; 2]; 2]| json!({ "startX": west, "startY": south, "endX": east, "endY": north });
     let available: Vec<Vec<Value>> =
         zooms.iter().map(|zoom| zoom.rectangles().into_iter().map(rectangle).collect()).collect();
     let mut list = json!({

@@ -3,7 +3,7 @@
 //! - [`cut`] clips triangles to the tiles of the finest zoom. All crossings of an edge with a border are computed from the edge and the border
 //!   alone, in whole numbers, so that tiles on both sides of a border have the same vertices there.
 //! - [`assemble`] joins the [`Piece`]s of a tile. What the terrain does not cover is filled, because a globe has no holes.
-//! - [`coarser`] selects vertices of four tiles for the tile above them, within the bound of its zoom ([`bound`]).
+//! - [`coarser`] selects vertices of four tiles for the tile above them, within the bound of its zoom ([`LEVEL_ZERO_ERROR`]).
 //! - [`encode`] writes the bytes of a tile, and [`decode`] reads them. [`layer`] lists the tiles.
 //!
 //! Tiles depend on the triangulation alone, not on how it was divided or in which order pieces came.
@@ -23,14 +23,16 @@ mod layer;
 mod mesh;
 mod normals;
 mod place;
+mod rough;
 mod side;
 #[cfg(test)]
 mod tests;
 mod tile;
+mod unfold;
 
 pub use assemble::assemble;
-pub use bound::{LEVEL_ZERO_ERROR, bound, finest_zoom};
-pub use coarser::{BuildError, Child, MOST_VERTICES, coarser, flat};
+pub use bound::{LEVEL_ZERO_ERROR, finest_zoom};
+pub use coarser::{Child, coarser, flat};
 pub use cut::{Piece, cut};
 pub use decode::{DecodedTile, NotATile, decode};
 pub use encode::{HeightSteps, Surface, encode};

@@ -32,7 +32,11 @@ pub(crate) fn sums(mesh: &TileMesh, tile: Tile) -> Vec<[f32; 3]> {
         }
         let from_a = |node: crate::Node| {
             let along = |to: u16, from: u16| f64::from(i32::from(to) - i32::from(from));
-            [along(node.u, a.u) * scale[0], along(node.v, a.v) * scale[1], (f64::from(node.h) - f64::from(a.h)) * scale[2]]
+            [
+                along(node.u, a.u) * scale[0],
+                along(node.v, a.v) * scale[1],
+                (f64::from(node.h) - f64::from(a.h)) * scale[2],
+            ]
         };
         let (p, q) = (from_a(b), from_a(c));
         let normal = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
@@ -58,7 +62,8 @@ pub(crate) fn normals(mesh: &TileMesh, tile: Tile, around: &[([i32; 2], Vec<Bord
         .filter(|(node, _)| node.is_on_border())
         .map(|(node, sum)| BorderNormal { place: [node.u, node.v], sum: *sum })
         .collect();
-    let mut tiles: Vec<([i32; 2], &[BorderNormal])> = around.iter().map(|(place, border)| (*place, &border[..])).collect();
+    let mut tiles: Vec<([i32; 2], &[BorderNormal])> =
+        around.iter().map(|(place, border)| (*place, &border[..])).collect();
     tiles.push(([0, 0], &own));
     // All tiles around a vertex add in the same order, so that they get the same bits.
     tiles.sort_by_key(|([east, north], _)| [*north, *east]);

@@ -17,6 +17,8 @@ const JSON: &str = "json";
 const TIF: &str = "tif";
 const CLASSIFIED: &str = "classified";
 const LAZ: &str = "laz";
+/// The folder, and the ending of its files.
+const TERRAIN: &str = "terrain";
 const CHECKSUMS: &str = "XXH128SUMS";
 
 /// A folder holds at most this many numbered files, and as many folders for each power of this that numbers reach.
@@ -157,6 +159,21 @@ impl OutputFiles {
     /// Returns the contour lines.
     pub fn contours(&self) -> PathBuf {
         self.directory.join("contours.gpkg")
+    }
+
+    /// Returns the folder of the terrain tiles for globes.
+    pub fn terrain_tiles(&self) -> PathBuf {
+        self.directory.join(TERRAIN)
+    }
+
+    /// Returns the list of the terrain tiles for globes.
+    pub fn terrain_layer(&self) -> PathBuf {
+        self.terrain_tiles().join("layer.json")
+    }
+
+    /// Returns the terrain tile in this column and row of a zoom.
+    pub fn terrain_tile(&self, zoom: u8, [column, row]: [i32; 2]) -> PathBuf {
+        self.terrain_tiles().join(format!("{zoom}/{column}/{row}.{TERRAIN}"))
     }
 
     /// Returns the page that shows the terrain in a browser.

@@ -5,6 +5,7 @@ use crate::compression::{Compression, CompressionChoice};
 use crate::contour_options::ContourOptions;
 use crate::page::{NOT_BUILT_IN, is_built_in};
 use crate::raster::options::RasterOptions;
+use crate::terrain_options::TerrainOptions;
 use crs::geoid::option::HeightOffset;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -69,6 +70,9 @@ pub struct OutputOptions {
     /// The contour lines, if there are to be some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contours: Option<ContourOptions>,
+    /// The terrain tiles for globes, if there are to be some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub terrain: Option<TerrainOptions>,
 }
 
 impl OutputOptions {

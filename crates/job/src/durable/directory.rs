@@ -108,6 +108,16 @@ impl JobDirectory {
         self.job.join("contours.boxes")
     }
 
+    /// Returns the path of the file in which the pieces of terrain tiles wait.
+    pub fn terrain_pieces(&self) -> PathBuf {
+        self.job.join("terrain.pieces")
+    }
+
+    /// Returns the path of the file in which the terrain tiles of a zoom wait.
+    pub fn terrain_meshes(&self, zoom: u8) -> PathBuf {
+        self.job.join(format!("terrain.{zoom}.meshes"))
+    }
+
     /// Returns the path of the journal of complete phases.
     pub fn journal(&self) -> PathBuf {
         self.job.join("journal")

@@ -40,6 +40,7 @@ impl Leftovers {
             output.preview_world(),
             output.contours(),
             output.contour_drawing(),
+            output.terrain_layer(),
         ];
         files.extend(PRODUCTS.into_iter().flat_map(|product| [output.raster(product), output.raster_list(product)]));
         files.extend(ExportFormat::ALL.map(|format| output.export(format)));
@@ -53,6 +54,7 @@ impl Leftovers {
         for (folder, ending) in output.numbered_folders() {
             left.add_folder(&folder, &mut Vec::new(), ending)?;
         }
+        left.add_terrain_tiles(&output.terrain_tiles(), 0)?;
         left.add_named_files(output.classified())?;
         Ok(left)
     }
@@ -66,6 +68,25 @@ impl Leftovers {
         let is_own = |path: &PathBuf| path.extension().is_some_and(|found| found == ending) || is_partial(path);
         self.files.extend(entries(&folder)?.into_iter().filter(is_own));
         self.folders.push(folder);
+        Ok(())
+    }
+
+    /// Adds what is in the folder of terrain tiles, or in a folder so many folders below, if it is there: zooms, columns, rows.
+    fn add_terrain_tiles(&mut self, folder: &Path, depth: usize) -> Result<()> {
+        if !is_folder(folder)? {
+            self.no_folders.extend(exists(folder)?.then(|| folder.to_path_buf()));
+            return Ok(());
+        }
+        for path in entries(folder)? {
+            let is_numbered = path.file_stem().is_some_and(|stem| is_number(&stem.to_string_lossy()));
+            let is_tile = path.extension().is_some_and(|ending| ending == "terrain") || is_partial(&path);
+            match depth {
+                2 if is_numbered && is_tile => self.files.push(path),
+                0 | 1 if is_numbered && path.extension().is_none() => self.add_terrain_tiles(&path, depth + 1)?,
+                _ => {}
+            }
+        }
+        self.folders.push(folder.into());
         Ok(())
     }
 

@@ -86,10 +86,11 @@ pub struct Fingerprint {
 
 /// The names of options among those of the style that no tile depends on: what they ask for is made from the finished tiles, each by a step
 /// of its own.
-const FROM_TILES: [(&str, JobStep); 3] = [
+const FROM_TILES: [(&str, JobStep); 4] = [
     ("[output] raster", JobStep::Raster),
     ("[output] contours", JobStep::Contours),
     ("[output] export", JobStep::Exports),
+    ("[output] terrain", JobStep::Terrain),
 ];
 
 /// Returns the step that makes what an option asks for from the finished tiles, if it is one of these.

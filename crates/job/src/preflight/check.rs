@@ -20,6 +20,7 @@ use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::publish::raster::check::{check_raster, planned_raster};
+use crate::publish::terrain_tiles::check::check_terrain;
 use crate::report::skipped_inputs::write_skipped;
 use points::Source;
 use points::surface::SurfaceShares;
@@ -126,6 +127,7 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     check_contours(&plan)?;
+    check_terrain(&plan)?;
     let threads = workers(options, plan.records)?;
     let mut preflight = if has_filter(&plan) {
         inspect_closely(&plan, threads)?

@@ -12,6 +12,7 @@ use crate::publish::contours::write_contours::contour_memory;
 use crate::publish::exports::export_limits::most_triangles;
 use crate::publish::raster::check::planned_raster;
 use crate::publish::raster::write_raster::raster_memory;
+use crate::publish::terrain_tiles::write_terrain::terrain_memory;
 use delaunay::geometry::Bounds;
 use points::is_url;
 use std::path::{Path, PathBuf};
@@ -193,7 +194,12 @@ pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
     let is_remote = |input: &PlannedInput| input.source.path.to_str().is_some_and(is_url);
     let buffers = if plan.inputs.iter().any(is_remote) { buffers + network_memory(options) } else { buffers };
     PROCESS_MEMORY
-        + leaves.max(levels).max(buffers).max(raster_memory(plan, threads)).max(contour_memory(plan, threads))
+        + leaves
+            .max(levels)
+            .max(buffers)
+            .max(raster_memory(plan, threads))
+            .max(contour_memory(plan, threads))
+            .max(terrain_memory(plan, threads))
 }
 
 fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {

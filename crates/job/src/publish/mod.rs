@@ -9,4 +9,5 @@ pub(crate) mod one_file_limits;
 pub(crate) mod placement;
 pub(crate) mod raster;
 pub(crate) mod side_files;
+pub(crate) mod terrain_tiles;
 pub(crate) mod tileset_tree;

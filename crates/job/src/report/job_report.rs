@@ -13,6 +13,7 @@ use crate::progress::stats::StageStats;
 use crate::publish::contours::write_contours::ContourStats;
 use crate::publish::exports::write_exports::ExportedFile;
 use crate::publish::raster::write_raster::RasterStats;
+use crate::publish::terrain_tiles::write_terrain::TerrainStats;
 use crate::report::breakline_report::BreaklineReport;
 use crate::report::clip_report::ClipReport;
 use crate::report::selection_report::SelectionReport;
@@ -69,6 +70,9 @@ pub struct Report {
     /// The contour lines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contours: Option<ContourStats>,
+    /// The terrain tiles for globes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub terrain: Option<TerrainStats>,
     /// The share of the triangles that cross a border between tiles.
     pub seam_share: f64,
     /// Points that were dropped because another has the same x and y.
@@ -230,6 +234,8 @@ pub struct ReportParts {
     pub exports: Vec<ExportedFile>,
     /// The contour lines.
     pub contours: Option<ContourStats>,
+    /// The terrain tiles for globes.
+    pub terrain: Option<TerrainStats>,
     /// The number of parts.
     pub parts: u64,
     /// The part that took the longest.
@@ -303,6 +309,7 @@ impl Report {
             raster: parts.raster,
             exports: parts.exports,
             contours: parts.contours,
+            terrain: parts.terrain,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
             duplicates: parts.leaves.duplicates + parts.duplicates,
             files: plan.inputs.len(),

@@ -89,6 +89,7 @@ impl<'a> Summary<'a> {
         paths.extend(PRODUCTS.into_iter().flat_map(|product| [output.raster(product), output.raster_list(product)]));
         paths.extend([output.contours(), output.contour_drawing()]);
         paths.extend(ExportFormat::ALL.map(|format| output.export(format)));
+        paths.push(output.terrain_layer());
         paths.push(output.classified().0);
         let there = paths.into_iter().filter(|path| path.exists());
         let files: Vec<String> = there.filter_map(|path: PathBuf| Some(name(Path::new(path.file_name()?)))).collect();

@@ -111,6 +111,11 @@ impl fmt::Display for Report {
             let size = precise_mebibytes(contours.bytes);
             row("contours", format!("{lines} lines of {points} points, {levels} levels, {size}"))?;
         }
+        if let Some(terrain) = &self.terrain {
+            let (tiles, last) = (grouped(terrain.tiles), terrain.zooms.len().saturating_sub(1));
+            let size = precise_mebibytes(terrain.bytes);
+            row("terrain", format!("{tiles} tiles of zooms 0 to {last}, {size}"))?;
+        }
         let TriangulationCounts { pipeline, reference, small, crowded, not_accepted, counts } = &self.leaves.outcome;
         let divided = small + crowded + not_accepted;
         row(

@@ -17,6 +17,7 @@ use crate::progress::stage::JobProgress;
 use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::raster::check::check_raster;
+use crate::publish::terrain_tiles::check::check_terrain;
 use crate::report::job_report::Report;
 use crate::run::damage::{damaged_by_tasks, is_damage};
 use crate::run::earlier_run::{EarlierRun, RunStart, place_results_of_finished_job, start};
@@ -181,6 +182,7 @@ fn attempt(
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     check_contours(&plan)?;
+    check_terrain(&plan)?;
     stage.advance(1);
     let planned = stage.finish();
     let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));

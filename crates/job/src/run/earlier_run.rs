@@ -187,6 +187,7 @@ impl EarlierRun {
             JobStep::Plan,
             JobStep::Raster,
             JobStep::Contours,
+            JobStep::Terrain,
             JobStep::Exports,
             JobStep::Classified,
             JobStep::Publish,

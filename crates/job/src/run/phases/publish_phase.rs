@@ -18,6 +18,7 @@ use crate::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::publish::placement::{heights_warning, place, placement_warning};
 use crate::publish::raster::write_raster::{RasterStats, RasterWork};
 use crate::publish::side_files::{EachTile, SideFiles, StoredTiles, write_side_files};
+use crate::publish::terrain_tiles::write_terrain::{TerrainStats, TerrainWork};
 use crate::publish::tileset_tree::TilesOfTree;
 use crate::records::{JobStep, Store};
 use crate::report::job_report::{Report, ReportParts, SlowestPart};
@@ -258,6 +259,7 @@ struct Published {
     raster: Option<RasterStats>,
     contours: Option<ContourStats>,
     exports: Vec<ExportedFile>,
+    terrain: Option<TerrainStats>,
     warnings: Warnings,
 }
 
@@ -296,6 +298,7 @@ fn publish(
     let raster = write_raster(run, plan, &appearance.style.frame, written.tiles)?;
     let contours = write_contours(run, plan, &appearance.style.frame, written.tiles)?;
     let exports = write_exports(run, plan, &appearance.style.frame, written)?;
+    let terrain = write_terrain(run, plan, &appearance.style.frame, written.tiles)?;
     let classified = write_classified(run, job)?;
     let stage = run.progress.stage("publish", 1, "job");
     let output = &plan.options.output;
@@ -349,10 +352,11 @@ fn publish(
     run.add_stage(stage.finish());
     let exported: u64 = exports.files.iter().map(|file| file.bytes).sum();
     let rasters_and_lines = raster.map_or(0, |raster| raster.bytes) + contours.map_or(0, |lines| lines.bytes);
-    let bytes = bytes + rasters_and_lines + exported + classified.bytes;
+    let bytes =
+        bytes + rasters_and_lines + exported + classified.bytes + terrain.as_ref().map_or(0, |tiles| tiles.bytes);
     warnings.extend(exports.warnings);
     warnings.extend(classified.warnings);
-    Ok(Published { bytes, levels: stats, raster, contours, exports: exports.files, warnings })
+    Ok(Published { bytes, levels: stats, raster, contours, exports: exports.files, terrain, warnings })
 }
 
 /// The raster of a job.
@@ -397,6 +401,18 @@ fn write_exports(run: &WholeRun, plan: &Plan, frame: &Frame, written: &WrittenFi
     let exports = run.journal.step(JobStep::Exports, || work.write(run.directory, &advance))?;
     run.add_stage(stage.finish());
     Ok(exports)
+}
+
+/// Writes terrain tiles for globes, if the user wants some. The scene of the tiles is that of `frame`.
+///
+/// # Errors
+/// Those of [`TerrainWork`].
+fn write_terrain(run: &WholeRun, plan: &Plan, frame: &Frame, tiles: &dyn EachTile) -> Result<Option<TerrainStats>> {
+    let Some(work) = TerrainWork::of(plan, frame, tiles)? else { return Ok(None) };
+    let stage = run.progress.stage("terrain", work.steps(), "tiles");
+    let stats = run.journal.step(JobStep::Terrain, || work.write(run.directory, &|steps| stage.advance(steps)))?;
+    run.add_stage(stage.finish());
+    Ok(Some(stats))
 }
 
 /// Writes the inputs with the classes that the job has found, if the user wants that.
@@ -454,6 +470,7 @@ fn write_report(
         raster: published.raster,
         contours: published.contours,
         exports: published.exports,
+        terrain: published.terrain,
         warnings: published.warnings,
         other_bytes: published.bytes + list.bytes,
         temporary: figures.temporary,

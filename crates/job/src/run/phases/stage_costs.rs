@@ -23,6 +23,9 @@ const RASTER_STORED: f64 = 60.0;
 /// The same for each point of contour lines: it depends on how many there are.
 const CONTOURS: f64 = 250.0;
 
+/// Of terrain tiles.
+const TERRAIN: f64 = 1500.0;
+
 fn cost_of_reading(format: FileFormat) -> f64 {
     match format {
         FileFormat::Las => 130.0,
@@ -45,6 +48,7 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
     let ground = if plan.options.input.finds_ground() { GROUND } else { 0.0 };
     let selecting = if plan.options.output.selects() { SELECT } else { 0.0 };
     let contours = if plan.options.output.contours.is_some() { CONTOURS } else { 0.0 };
+    let terrain = if plan.options.output.terrain.is_some() { TERRAIN } else { 0.0 };
     vec![
         ("read", reading),
         ("select", points * (ground + selecting)),
@@ -53,6 +57,7 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
         ("raster", raster),
         ("export", points * exports),
         ("contours", points * contours),
+        ("terrain", points * terrain),
         ("publish", points * PUBLISH),
     ]
 }

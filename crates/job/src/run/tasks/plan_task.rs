@@ -15,6 +15,7 @@ use crate::progress::stage::JobProgress;
 use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::raster::check::check_raster;
+use crate::publish::terrain_tiles::check::check_terrain;
 use crate::run::attempt::read_earlier;
 use crate::run::earlier_run::{EarlierRun, start};
 use crate::run::finished::known_submission;
@@ -59,6 +60,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     check_height_offset(&plan)?;
     check_raster(&plan)?;
     check_contours(&plan)?;
+    check_terrain(&plan)?;
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
     let threads = workers(options, plan.records)?;
     if !run.force {

@@ -1,0 +1,78 @@
+//! Whether terrain tiles can be written, before the job begins.
+
+use crate::plan::globe_system::globe_system;
+use crate::plan::job_plan::Plan;
+use crate::publish::terrain_tiles::globe_grid::Place;
+use crs::geoid::Geoid;
+use delaunay::geometry::Bounds;
+use sys::{Error, Result};
+use tiles::tiles3d::globe::Globe;
+
+/// The greatest latitude in degrees: around a pole, columns are no longer beside each other.
+const MOST_LATITUDE: f64 = 89.0;
+
+/// The widest terrain in degrees of longitude.
+const MOST_LONGITUDES: f64 = 90.0;
+
+/// Returns the way of the job to the globe.
+///
+/// # Errors
+/// [`Error::Config`] if there is none, [`Error::Io`] or [`Error::Config`] on the geoid.
+pub(crate) fn globe_of(plan: &Plan) -> Result<Globe> {
+    let metres = plan.frame.extras().metres_per_unit;
+    let system = globe_system(&plan.crs, metres).map_err(|why| {
+        Error::Config(format!(
+            "[output.terrain] needs the place of the terrain on the globe: {why}; fix: [input] crs = \"EPSG:...\" if you know the system, or \
+             leave [output.terrain] out"
+        ))
+    })?;
+    Ok(Globe::new(system, metres, Geoid::open(plan.options.output.height_offset.as_ref())?))
+}
+
+/// Checks that terrain tiles can be written, as far as headers tell, if the user wants some.
+///
+/// # Errors
+/// [`Error::Config`] if they cannot.
+pub(crate) fn check_terrain(plan: &Plan) -> Result<()> {
+    if plan.options.output.terrain.is_none() {
+        return Ok(());
+    }
+    let globe = globe_of(plan)?;
+    check_places(plan, &globe, plan.extent)
+}
+
+/// Checks that a terrain within `bounds` is neither around a pole nor around the globe.
+///
+/// # Errors
+/// [`Error::Config`] if it is.
+pub(crate) fn check_places(plan: &Plan, globe: &Globe, bounds: Bounds<2>) -> Result<()> {
+    const PARTS: i64 = 4;
+    let along = |axis: usize, part: i64| (i64::from(bounds.min[axis]) + bounds.extent(axis) * part / PARTS) as i32;
+    let places = (0..=PARTS).flat_map(|i| (0..=PARTS).map(move |j| [along(0, i), along(1, j)]));
+    let middle = Place::of(plan, globe, bounds.middle()).map_err(|why| refused(&why))?;
+    let (mut highest, mut widest) = (0.0f64, 0.0f64);
+    for place in places {
+        // Corners of the box may lie outside the range of a projection in which all points are.
+        let Ok(place) = Place::of(plan, globe, place) else { continue };
+        highest = highest.max(place.latitude.to_degrees().abs());
+        widest = widest.max(2.0 * (place.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs());
+    }
+    if highest > MOST_LATITUDE {
+        return Err(refused(&format!(
+            "the terrain reaches {highest:.2} degrees north or south, and the columns of tiles meet at the poles; {MOST_LATITUDE} degrees is \
+             the limit"
+        )));
+    }
+    if widest > MOST_LONGITUDES {
+        return Err(refused(&format!(
+            "the terrain spans about {widest:.0} degrees of longitude; {MOST_LONGITUDES} degrees is the limit"
+        )));
+    }
+    Ok(())
+}
+
+fn refused(why: &str) -> Error {
+    Error::Config(format!(
+        "[output.terrain] cannot be written: {why}; fix: smaller [input] bounds, or leave [output.terrain] out"
+    ))
+}

@@ -1,0 +1,135 @@
+//! Files in which pieces and meshes of tiles wait.
+
+use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut, cast_slice, cast_slice_mut, zeroed_vec};
+use quantized_mesh::{BorderNormal, Node, OUTSIDE, Piece, TileMesh};
+use std::fs::File;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+use sys::positional_io::read_exact_at;
+use sys::{Error, Result, disk, fault};
+
+/// A file of records. Threads may add some in any order.
+pub(super) struct WaitingFile {
+    path: PathBuf,
+    file: File,
+    end: Mutex<u64>,
+}
+
+/// What a record has, at its beginning.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct Counts {
+    border: u32,
+    nodes: u32,
+    triangles: u32,
+    corners: [i32; 4],
+}
+
+impl WaitingFile {
+    /// Makes the file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn create(path: PathBuf) -> Result<WaitingFile> {
+        let file = disk::create(&path).map_err(Error::io("create", &path))?;
+        Ok(WaitingFile { path, file, end: Mutex::new(0) })
+    }
+
+    /// Adds a piece, and returns its place.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn add_piece(&self, piece: &Piece) -> Result<u64> {
+        let corners = piece.corners.map(|corner| corner.unwrap_or(OUTSIDE));
+        self.add(corners, &[], &piece.nodes, &piece.triangles)
+    }
+
+    /// Adds a mesh with what it adds to the normals on its border, and returns its place.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn add_mesh(&self, mesh: &TileMesh, border: &[BorderNormal]) -> Result<u64> {
+        self.add([OUTSIDE; 4], border, &mesh.nodes, &mesh.triangles)
+    }
+
+    fn add(&self, corners: [i32; 4], border: &[BorderNormal], nodes: &[Node], triangles: &[[u32; 3]]) -> Result<u64> {
+        let [of_border, of_nodes, of_triangles] =
+            [border.len(), nodes.len(), triangles.len()].map(|count| count as u32);
+        let counts = Counts { border: of_border, nodes: of_nodes, triangles: of_triangles, corners };
+        let record = [bytes_of(&counts), cast_slice(border), cast_slice(nodes), cast_slice(triangles)].concat();
+        let mut end = self.end.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = *end;
+        *end += record.len() as u64;
+        drop(end);
+        disk::write_all_at(&self.file, &record, at).map_err(Error::io("write", &self.path))?;
+        Ok(at)
+    }
+
+    /// Reads a piece.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn piece(&self, at: u64) -> Result<Piece> {
+        let (counts, mut at) = self.counts(at)?;
+        at += u64::from(counts.border) * size_of::<BorderNormal>() as u64;
+        let nodes = self.list(&mut at, counts.nodes)?;
+        let triangles = self.list(&mut at, counts.triangles)?;
+        Ok(Piece { nodes, triangles, corners: counts.corners.map(|corner| (corner != OUTSIDE).then_some(corner)) })
+    }
+
+    /// Reads a mesh.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn mesh(&self, at: u64) -> Result<TileMesh> {
+        let Piece { nodes, triangles, .. } = self.piece(at)?;
+        Ok(TileMesh { nodes, triangles })
+    }
+
+    /// Reads the vertices of a mesh.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn nodes(&self, at: u64) -> Result<Vec<Node>> {
+        let (counts, mut at) = self.counts(at)?;
+        at += u64::from(counts.border) * size_of::<BorderNormal>() as u64;
+        self.list(&mut at, counts.nodes)
+    }
+
+    /// Reads what a mesh adds to the normals on its border.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn border(&self, at: u64) -> Result<Vec<BorderNormal>> {
+        let (counts, mut at) = self.counts(at)?;
+        self.list(&mut at, counts.border)
+    }
+
+    fn counts(&self, at: u64) -> Result<(Counts, u64)> {
+        let mut counts = Counts::zeroed();
+        self.read(bytes_of_mut(&mut counts), at)?;
+        Ok((counts, at + size_of::<Counts>() as u64))
+    }
+
+    /// Reads so many things, and goes on behind them.
+    fn list<T: Pod>(&self, at: &mut u64, count: u32) -> Result<Vec<T>> {
+        let mut list = zeroed_vec(count as usize);
+        self.read(cast_slice_mut(&mut list), *at)?;
+        *at += size_of_val(&list[..]) as u64;
+        Ok(list)
+    }
+
+    fn read(&self, bytes: &mut [u8], at: u64) -> Result<()> {
+        let read = fault::read("read-result").and_then(|()| read_exact_at(&self.file, bytes, at));
+        read.map_err(Error::io("read", &self.path))
+    }
+
+    /// Removes the file.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn discard(self) -> Result<()> {
+        drop(self.file);
+        disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))
+    }
+}

@@ -1,0 +1,239 @@
+//! Writing `terrain/`.
+
+use crate::durable::atomic_file::{PendingFile, create_folder_of, write_pending};
+use crate::durable::directory::JobDirectory;
+use crate::plan::job_plan::Plan;
+use crate::publish::raster::tile_meshes::{TileBox, boxes, lattice_mesh};
+use crate::publish::side_files::EachTile;
+use crate::publish::terrain_tiles::check::{check_places, globe_of};
+use crate::publish::terrain_tiles::globe_grid::{GlobeGrid, Place};
+use crate::publish::terrain_tiles::waiting::WaitingFile;
+use crate::publish::terrain_tiles::zooms::{Surroundings, WaitingPiece, Zoom};
+use delaunay::geometry::Bounds;
+use delaunay::geometry::predicates::orient2d;
+use quantized_mesh::{HEIGHT_STEPS, LayerAbout, Tile, ZoomTiles, cut, finest_zoom, layer};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::{Mutex, PoisonError};
+use sys::{Error, Result, interrupt};
+use tiles::frame::Frame;
+use tiles::raster::window::LatticeMesh;
+use tiles::tiles3d::globe::Globe;
+
+/// What came of terrain tiles.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TerrainStats {
+    /// The number of tiles.
+    pub tiles: u64,
+    /// Bytes of all files.
+    pub bytes: u64,
+    /// The height above the ellipsoid in metres around the terrain, where tiles reach beyond it.
+    pub surroundings: f64,
+    /// The zooms, from 0 on.
+    pub zooms: Vec<ZoomStats>,
+}
+
+/// The tiles of a zoom.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ZoomStats {
+    /// The number of tiles.
+    pub tiles: u64,
+    /// Their triangles.
+    pub triangles: u64,
+    /// How far in metres the vertices of the next finer zoom may be from them, along the vertical; 0 at the finest zoom.
+    pub error_to_finer: f64,
+    /// The step that heights are rounded to, in metres.
+    pub height_step: f64,
+}
+
+/// Terrain tiles that are to be written.
+pub(crate) struct TerrainWork<'a> {
+    plan: &'a Plan,
+    frame: &'a Frame,
+    tiles: Vec<TileBox>,
+    globe: Globe,
+}
+
+/// What the tiles of a job have in common.
+#[derive(Clone, Copy, Debug, Default)]
+struct Measured {
+    /// Twice the area in square lattice steps.
+    double_area: u64,
+    triangles: u64,
+    bounds: Option<Bounds<2>>,
+}
+
+impl Measured {
+    fn of(mesh: &LatticeMesh) -> Measured {
+        let site = |v: u32| {
+            let [x, y, _] = mesh.positions[v as usize];
+            [x, y]
+        };
+        let areas = mesh.triangles.iter().map(|&[a, b, c]| orient2d(site(a), site(b), site(c)).unsigned_abs());
+        Measured {
+            double_area: areas.sum(),
+            triangles: mesh.triangles.len() as u64,
+            bounds: Bounds::of_points(mesh.triangles.iter().flatten().map(|&v| site(v))),
+        }
+    }
+
+    fn join(self, other: Measured) -> Measured {
+        Measured {
+            double_area: self.double_area + other.double_area,
+            triangles: self.triangles + other.triangles,
+            bounds: self.bounds.into_iter().chain(other.bounds).reduce(Bounds::union),
+        }
+    }
+}
+
+impl<'a> TerrainWork<'a> {
+    /// Looks at what is to be done for the terrain tiles of a job whose tiles have the scene of `frame`; `None` if the user wants none.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Broken`] on a store, [`Error::Config`] if the terrain has no place on the globe.
+    pub(crate) fn of(plan: &'a Plan, frame: &'a Frame, tiles: &dyn EachTile) -> Result<Option<TerrainWork<'a>>> {
+        if plan.options.output.terrain.is_none() {
+            return Ok(None);
+        }
+        Ok(Some(TerrainWork { plan, frame, tiles: boxes(tiles)?, globe: globe_of(plan)? }))
+    }
+
+    /// Returns about the number of steps: tiles to measure and to cut.
+    pub(crate) fn steps(&self) -> u64 {
+        2 * self.tiles.len() as u64
+    }
+
+    /// Writes the tiles from those of the job, which must have their names. Calls `done` for each of the [steps](TerrainWork::steps).
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Input`] on a file, [`Error::Config`] if a place is not on the globe, [`Error::Interrupted`].
+    pub(crate) fn write(
+        &self,
+        directory: &JobDirectory,
+        done: &(dyn Fn(u64) + Sync),
+    ) -> Result<(TerrainStats, Vec<PendingFile>)> {
+        let measured = self.measure(directory, done)?;
+        let bounds = measured.bounds.ok_or_else(|| Error::Broken("there is no triangle for terrain tiles".into()))?;
+        check_places(self.plan, &self.globe, bounds)?;
+        let middle = bounds.middle();
+        let place = Place::of(self.plan, &self.globe, middle).map_err(Error::Config)?;
+        let grid = |zoom: u8| GlobeGrid::new(self.plan, &self.globe, zoom, place.longitude);
+        // Any zoom tells the area of a step.
+        let area_of_step = grid(quantized_mesh::MOST_ZOOM).area_of_step(middle)?;
+        let area = measured.double_area as f64 / 2.0 * area_of_step.abs();
+        let zoom = finest_zoom(area, measured.triangles / 2, place.latitude);
+        let (pieces, list) = self.cut(directory, &grid(zoom), area_of_step < 0.0, done)?;
+        let mut finest = Zoom::finest(zoom, directory, pieces, list, &|_| ())?;
+        let surroundings = Surroundings { height: finest.mean_edge() };
+        let mut pyramid =
+            Pyramid { directory, surroundings, stats: TerrainStats::default(), files: Vec::new(), zooms: Vec::new() };
+        pyramid.stats.surroundings = f64::from(surroundings.height) / HEIGHT_STEPS;
+        let degrees = degrees_of(&finest.tiles.iter().map(|tile| tile.tile).collect::<Vec<Tile>>());
+        while finest.zoom > 0 {
+            let coarser = finest.coarser(directory, surroundings, &|_| ())?;
+            pyramid.write(finest)?;
+            finest = coarser;
+        }
+        pyramid.write(finest)?;
+        let about = LayerAbout { bounds: degrees, attribution: self.plan.options.output.copyright() };
+        pyramid.finish(&about)
+    }
+
+    fn measure(&self, directory: &JobDirectory, done: &(dyn Fn(u64) + Sync)) -> Result<Measured> {
+        let measure = |tile: &TileBox| {
+            interrupt::check()?;
+            let measured = Measured::of(&lattice_mesh(&directory.output().tile(tile.tile.number()), self.frame)?);
+            done(1);
+            Ok(measured)
+        };
+        let measured = self.tiles.par_iter().with_max_len(1).map(measure);
+        measured.try_reduce(Measured::default, |a, b| Ok(a.join(b)))
+    }
+
+    /// Cuts all tiles along those of a zoom.
+    fn cut(
+        &self,
+        directory: &JobDirectory,
+        grid: &GlobeGrid,
+        is_mirrored: bool,
+        done: &(dyn Fn(u64) + Sync),
+    ) -> Result<(WaitingFile, Vec<WaitingPiece>)> {
+        let (file, list) = (WaitingFile::create(directory.terrain_pieces())?, Mutex::new(Vec::new()));
+        self.tiles.par_iter().with_max_len(1).try_for_each(|tile| {
+            interrupt::check()?;
+            let mut mesh = lattice_mesh(&directory.output().tile(tile.tile.number()), self.frame)?;
+            if is_mirrored {
+                mesh.triangles.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+            }
+            let points = grid.points(&mesh.positions)?;
+            for ([x, y], piece) in cut(&points, &mesh.triangles) {
+                let piece = (Tile { zoom: grid.zoom(), x, y }, file.add_piece(&piece)?);
+                list.lock().unwrap_or_else(PoisonError::into_inner).push(piece);
+            }
+            done(1);
+            Ok::<_, Error>(())
+        })?;
+        Ok((file, list.into_inner().unwrap_or_else(PoisonError::into_inner)))
+    }
+}
+
+/// The zooms that are written so far, the finest first.
+struct Pyramid<'a> {
+    directory: &'a JobDirectory,
+    surroundings: Surroundings,
+    stats: TerrainStats,
+    files: Vec<PendingFile>,
+    zooms: Vec<ZoomTiles>,
+}
+
+impl Pyramid<'_> {
+    /// Writes the tiles of a zoom.
+    fn write(&mut self, zoom: Zoom) -> Result<()> {
+        let write = |tile: Tile, bytes: Vec<u8>| {
+            let path = self.directory.output().terrain_tile(tile.zoom, [tile.column(), tile.y]);
+            create_folder_of(&path)?;
+            write_pending(&path, &bytes)
+        };
+        self.files.extend(zoom.encode(self.surroundings, &write)?);
+        let tiles: Vec<Tile> = zoom.tiles.iter().map(|tile| tile.tile).collect();
+        self.zooms.push(ZoomTiles::new(&tiles));
+        self.stats.zooms.push(ZoomStats {
+            tiles: tiles.len() as u64,
+            triangles: zoom.tiles.iter().map(|tile| tile.triangles).sum(),
+            error_to_finer: zoom.tiles.iter().map(|tile| tile.bound).max().unwrap_or(0) as f64 / HEIGHT_STEPS,
+            height_step: zoom.height_steps(self.surroundings.at(zoom.zoom)).metres(),
+        });
+        zoom.discard()
+    }
+
+    /// Writes the list of the tiles.
+    fn finish(mut self, about: &LayerAbout) -> Result<(TerrainStats, Vec<PendingFile>)> {
+        self.zooms.reverse();
+        self.stats.zooms.reverse();
+        self.stats.tiles = self.stats.zooms.iter().map(|zoom| zoom.tiles).sum();
+        let path = self.directory.output().terrain_layer();
+        self.files.push(write_pending(&path, layer(&self.zooms, about).as_bytes())?);
+        self.stats.bytes = self.files.iter().map(|file| file.bytes).sum();
+        Ok((self.stats, self.files))
+    }
+}
+
+/// Returns west, south, east and north of tiles in degrees.
+fn degrees_of(tiles: &[Tile]) -> [f64; 4] {
+    let side = tiles.first().map_or(180.0, |tile| 180.0 / f64::from(1u32 << tile.zoom));
+    let ends = |along: fn(&Tile) -> i32| {
+        let numbers = tiles.iter().map(along);
+        let [low, high] = numbers.fold([i32::MAX, i32::MIN], |[low, high], number| [low.min(number), high.max(number)]);
+        [f64::from(low) * side, (f64::from(high) + 1.0) * side]
+    };
+    let ([west, east], [south, north]) = (ends(|tile| tile.x), ends(|tile| tile.y));
+    let turned = |degrees: f64| if degrees > 180.0 { degrees - 360.0 } else { degrees };
+    [(west - 180.0).max(-180.0), south - 90.0, turned(east - 180.0), north - 90.0]
+}
+
+/// Returns about how many bytes of memory terrain tiles take on so many threads.
+pub(crate) fn terrain_memory(plan: &Plan, threads: usize) -> u64 {
+    // A tile of the job, its points on the grid and its pieces; or four tiles and the selection from them.
+    const PER_THREAD: u64 = 64 << 20;
+    if plan.options.output.terrain.is_some() { threads as u64 * PER_THREAD } else { 0 }
+}

@@ -1,0 +1,222 @@
+//! The tiles of one zoom after the other.
+
+use crate::durable::directory::JobDirectory;
+use crate::publish::terrain_tiles::waiting::WaitingFile;
+use quantized_mesh::{
+    BorderNormal, Child, HEIGHT_STEPS, HeightSteps, LEVEL_ZERO_ERROR, OUTSIDE, Surface, Tile, TileMesh, assemble,
+    border_normals, coarser, encode, flat, gzip,
+};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use sys::{Error, Result, interrupt};
+
+/// A tile whose mesh waits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WaitingTile {
+    pub(super) tile: Tile,
+    /// Where its mesh is.
+    at: u64,
+    /// The lowest and the highest vertex of the terrain, in steps.
+    heights: [i32; 2],
+    /// Whether some vertices are not of the terrain.
+    has_surroundings: bool,
+    pub(super) triangles: u64,
+    /// How far the vertices of the tiles below may be from it, in steps.
+    pub(super) bound: u64,
+    /// The sum and the number of the heights along the edge of the terrain.
+    edge: [i64; 2],
+}
+
+/// The tiles of a zoom.
+pub(super) struct Zoom {
+    pub(super) zoom: u8,
+    /// In order.
+    pub(super) tiles: Vec<WaitingTile>,
+    file: WaitingFile,
+}
+
+/// A piece of a tile, and its place in the file.
+pub(super) type WaitingPiece = (Tile, u64);
+
+impl Zoom {
+    /// Joins pieces, which may come in any order, to the tiles of the finest zoom.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Interrupted`].
+    pub(super) fn finest(
+        zoom: u8,
+        directory: &JobDirectory,
+        pieces: WaitingFile,
+        mut list: Vec<WaitingPiece>,
+        done: &(dyn Fn(u64) + Sync),
+    ) -> Result<Zoom> {
+        list.sort_unstable();
+        let file = WaitingFile::create(directory.terrain_meshes(zoom))?;
+        let groups: Vec<&[WaitingPiece]> = list.chunk_by(|a, b| a.0 == b.0).collect();
+        let made = groups.par_iter().with_max_len(1).map(|group| {
+            interrupt::check()?;
+            let of_tile = group.iter().map(|(_, at)| pieces.piece(*at)).collect::<Result<Vec<_>>>()?;
+            let made = assemble(&of_tile).map(|mesh| WaitingTile::add(&file, group[0].0, &mesh, 0));
+            done(1);
+            made.transpose()
+        });
+        let tiles = made.collect::<Result<Vec<Option<WaitingTile>>>>()?.into_iter().flatten().collect();
+        pieces.discard()?;
+        Ok(Zoom { zoom, tiles, file })
+    }
+
+    /// Returns the tiles of the zoom before. At zoom 0 both are there, because viewers want both. `surroundings` is the height beside the terrain.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Interrupted`].
+    pub(super) fn coarser(
+        &self,
+        directory: &JobDirectory,
+        surroundings: Surroundings,
+        done: &(dyn Fn(u64) + Sync),
+    ) -> Result<Zoom> {
+        let zoom = self.zoom.saturating_sub(1);
+        let file = WaitingFile::create(directory.terrain_meshes(zoom))?;
+        let mut by_parent: Vec<(Tile, &WaitingTile)> =
+            self.tiles.iter().map(|tile| (tile.tile.parent(), tile)).collect();
+        by_parent.sort_unstable_by_key(|(parent, child)| (*parent, child.tile));
+        let groups: Vec<&[(Tile, &WaitingTile)]> = by_parent.chunk_by(|a, b| a.0 == b.0).collect();
+        let made = groups.par_iter().with_max_len(1).map(|group| {
+            interrupt::check()?;
+            let made = self.above(group, &file, surroundings.at(zoom));
+            done(1);
+            made
+        });
+        let mut tiles: Vec<WaitingTile> = made.collect::<Result<_>>()?;
+        if zoom == 0 {
+            for x in 0..2 {
+                if !tiles.iter().any(|tile| tile.tile.column() == x) {
+                    let tile = Tile { zoom, x, y: 0 };
+                    tiles.push(WaitingTile::add(&file, tile, &flat(tile).map_err(broken)?, 0)?);
+                }
+            }
+        }
+        Ok(Zoom { zoom, tiles, file })
+    }
+
+    /// Makes the tile above some, which are all tiles in it.
+    fn above(&self, group: &[(Tile, &WaitingTile)], file: &WaitingFile, outside: i32) -> Result<WaitingTile> {
+        let tile = group[0].0;
+        let child = |(_, child): &(Tile, &WaitingTile)| {
+            let quadrant = [child.tile.x & 1, child.tile.y & 1].map(|half| half as u8);
+            Ok(Child { quadrant, nodes: self.file.nodes(child.at)? })
+        };
+        let children = group.iter().map(child).collect::<Result<Vec<Child>>>()?;
+        let (mesh, bound) = coarser(tile, &children, outside).map_err(broken)?;
+        WaitingTile::add(file, tile, &mesh, bound)
+    }
+
+    /// Returns the mean height along the edge of the terrain in steps; 0 if it has no edge within its tiles.
+    pub(super) fn mean_edge(&self) -> i32 {
+        let sums = self.tiles.iter().map(|tile| tile.edge.map(i128::from));
+        let [sum, count] = sums.fold([0, 0], |[sum, count], [more, others]| [sum + more, count + others]);
+        if count == 0 { 0 } else { sum.div_euclid(count) as i32 }
+    }
+
+    /// Returns the step of height that all tiles can be written with.
+    pub(super) fn height_steps(&self, outside: i32) -> HeightSteps {
+        let range = |tile: &WaitingTile| {
+            let [low, high] = tile.heights;
+            let [low, high] = match (low > high, tile.has_surroundings) {
+                (true, _) => [outside; 2],
+                (false, true) => [low.min(outside), high.max(outside)],
+                (false, false) => [low, high],
+            };
+            high.abs_diff(low)
+        };
+        HeightSteps::over(self.tiles.iter().map(range).max().unwrap_or(0).into())
+    }
+
+    /// Calls `write` with each tile and the bytes of its file.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Interrupted`], and those of `write`.
+    pub(super) fn encode<T: Send>(
+        &self,
+        surroundings: Surroundings,
+        write: &(dyn Fn(Tile, Vec<u8>) -> Result<T> + Sync),
+    ) -> Result<Vec<T>> {
+        let outside = surroundings.at(self.zoom);
+        let steps = self.height_steps(outside);
+        let places: HashMap<Tile, u64> = self.tiles.iter().map(|tile| (tile.tile, tile.at)).collect();
+        let encoded = self.tiles.par_iter().with_max_len(1).map(|waiting| {
+            interrupt::check()?;
+            let (mesh, around) = (self.file.mesh(waiting.at)?, self.around(waiting.tile, &places)?);
+            let surface = Surface { tile: waiting.tile, mesh: &mesh, outside, around: &around };
+            write(waiting.tile, gzip(&encode(&surface, steps)))
+        });
+        encoded.collect()
+    }
+
+    /// Returns the borders of the tiles around one.
+    fn around(&self, tile: Tile, places: &HashMap<Tile, u64>) -> Result<Vec<([i32; 2], Vec<BorderNormal>)>> {
+        let mut around = Vec::new();
+        for offset in (-1..=1).flat_map(|north| (-1..=1).map(move |east| [east, north])) {
+            if offset != [0, 0]
+                && let Some(at) = places.get(&tile.beside(offset))
+            {
+                around.push((offset, self.file.border(*at)?));
+            }
+        }
+        Ok(around)
+    }
+
+    /// Removes its meshes.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn discard(self) -> Result<()> {
+        self.file.discard()
+    }
+}
+
+impl WaitingTile {
+    /// Adds a mesh with this bound to a file.
+    fn add(file: &WaitingFile, tile: Tile, mesh: &TileMesh, bound: u64) -> Result<WaitingTile> {
+        let at = file.add_mesh(mesh, &border_normals(mesh, tile))?;
+        let ground = mesh.nodes.iter().map(|node| node.h).filter(|h| *h != OUTSIDE);
+        let heights = ground.fold([i32::MAX, i32::MIN], |[low, high], h| [low.min(h), high.max(h)]);
+        let has_surroundings = mesh.nodes.iter().any(|node| node.h == OUTSIDE);
+        let edge = if has_surroundings { edge_of(mesh) } else { [0, 0] };
+        let triangles = mesh.triangles.len() as u64;
+        Ok(WaitingTile { tile, at, heights, has_surroundings, triangles, bound, edge })
+    }
+}
+
+/// Returns the sum and the number of the heights of vertices of the terrain beside others.
+fn edge_of(mesh: &TileMesh) -> [i64; 2] {
+    let height = |v: u32| mesh.nodes[v as usize].h;
+    let is_beside = |triangle: &&[u32; 3]| triangle.iter().any(|&v| height(v) == OUTSIDE);
+    let mut edge: Vec<u32> = mesh.triangles.iter().filter(is_beside).flatten().copied().collect();
+    edge.sort_unstable();
+    edge.dedup();
+    let heights = edge.into_iter().map(height).filter(|h| *h != OUTSIDE);
+    heights.fold([0, 0], |[sum, count], h| [sum + i64::from(h), count + 1])
+}
+
+/// What lies beside the terrain: a plain at the height of its edge, and the ellipsoid where tiles are so coarse that this makes no difference.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surroundings {
+    /// In steps.
+    pub(super) height: i32,
+}
+
+impl Surroundings {
+    /// Returns the height at a zoom.
+    pub(super) fn at(self, zoom: u8) -> i32 {
+        let error = LEVEL_ZERO_ERROR * HEIGHT_STEPS / f64::from(1u32 << zoom);
+        if error <= f64::from(self.height).abs() { self.height } else { 0 }
+    }
+}
+
+fn broken(error: delaunay::Error) -> Error {
+    match error {
+        error if error.is_stopped() => Error::Interrupted,
+        error => Error::Broken(format!("a terrain tile: {error}")),
+    }
+}
