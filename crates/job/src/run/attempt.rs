@@ -16,6 +16,7 @@ use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
 use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
+use crate::publish::map_tiles::check::check_map_tiles;
 use crate::publish::raster::check::check_raster;
 use crate::report::job_report::Report;
 use crate::run::damage::{damaged_by_tasks, is_damage};
@@ -180,6 +181,7 @@ fn attempt(
     plan.warnings.extend(job.modified.clone());
     check_height_offset(&plan)?;
     check_raster(&plan)?;
+    check_map_tiles(&plan)?;
     check_contours(&plan)?;
     stage.advance(1);
     let planned = stage.finish();

@@ -1,6 +1,7 @@
 //! What the stages of a job usually cost, for the estimate of the time left.
 
 use crate::plan::job_plan::Plan;
+use crate::publish::map_tiles::check::planned_map_tiles;
 use crate::publish::raster::check::planned_raster;
 use points::FileFormat;
 
@@ -20,6 +21,9 @@ const EXPORT: f64 = 400.0;
 const RASTER: f64 = 170.0;
 const RASTER_STORED: f64 = 60.0;
 
+/// The same for each pixel of map tiles of the finest zoom.
+const MAP_TILES: f64 = 130.0;
+
 /// The same for each point of contour lines: it depends on how many there are.
 const CONTOURS: f64 = 250.0;
 
@@ -38,6 +42,7 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
     let points = plan.records as f64;
     let raster = planned_raster(plan);
     let raster = raster.map_or(0.0, |grid| grid.cells() as f64 * RASTER + grid.stored_cells() as f64 * RASTER_STORED);
+    let map_tiles = planned_map_tiles(plan).map_or(0.0, |(_, pixels)| pixels as f64 * MAP_TILES);
     let exports = match plan.options.output.export.formats().count() {
         0 => 0.0,
         formats => NUMBER + formats as f64 * EXPORT,
@@ -51,6 +56,7 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
         ("mesh", points * MESH),
         ("levels", points * LEVELS),
         ("raster", raster),
+        ("map tiles", map_tiles),
         ("export", points * exports),
         ("contours", points * contours),
         ("publish", points * PUBLISH),

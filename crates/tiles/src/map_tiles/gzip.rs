@@ -1,0 +1,17 @@
+//! Packing bytes as gzip, by the same coder everywhere.
+
+use miniz_oxide::deflate::compress_to_vec;
+
+/// How hard the coder tries.
+const LEVEL: u8 = 6;
+
+/// Returns bytes in the format of gzip, without a time.
+pub(crate) fn gzipped(bytes: &[u8]) -> Vec<u8> {
+    const UNKNOWN_SYSTEM: u8 = 255;
+    let mut packed = vec![0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, UNKNOWN_SYSTEM];
+    packed.extend(compress_to_vec(bytes, LEVEL));
+    packed.extend(crc32fast::hash(bytes).to_le_bytes());
+    // The format has the length modulo 2^32.
+    packed.extend((bytes.len() as u32).to_le_bytes());
+    packed
+}
