@@ -33,6 +33,14 @@ impl HeightEncoding {
         [red, green, blue]
     }
 
+    /// Returns the name that the configuration has for the encoding.
+    pub fn name(self) -> &'static str {
+        match self {
+            HeightEncoding::Terrarium => "terrarium",
+            HeightEncoding::TerrainRgb => "terrain-rgb",
+        }
+    }
+
     /// Returns the name that MapLibre has for the encoding.
     pub fn maplibre_name(self) -> &'static str {
         match self {
