@@ -25,10 +25,10 @@ async function shown() {
     maxPitch: 80,
     style: {
       version: 8,
-      sources: { terrain: { type: 'raster-dem', url: `pmtiles://${archive}`, encoding, tileSize } },
+      sources: Object.fromEntries(['terrain', 'relief'].map((name) => [name, { type: 'raster-dem', url: `pmtiles://${archive}`, encoding, tileSize }])),
       layers: [
         { id: 'ground', type: 'background', paint: { 'background-color': '#8fb3d9' } },
-        { id: 'shade', type: 'hillshade', source: 'terrain' },
+        { id: 'shade', type: 'hillshade', source: 'relief' },
       ],
       terrain: { source: 'terrain' },
     },
