@@ -22,7 +22,7 @@ impl MapTile {
         let (mut x, mut y, mut along) = (u64::from(self.x), u64::from(self.y), 0);
         for bit in (0..self.zoom).rev() {
             let [right, low] = [x, y].map(|place| place >> bit & 1);
-            along += (3 * right ^ low) << (2 * bit);
+            along += ((3 * right) ^ low) << (2 * bit);
             if low == 0 {
                 if right == 1 {
                     (x, y) = (side - 1 - x, side - 1 - y);
