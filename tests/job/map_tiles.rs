@@ -85,7 +85,7 @@ fn place(id: usize) -> [usize; 3] {
     let (mut x, mut y) = (0, 0);
     for bit in 0..zoom {
         let side = 1 << bit;
-        let right = along / 2 & 1;
+        let right = (along / 2) & 1;
         let low = (along ^ right) & 1;
         if low == 0 {
             if right == 1 {
