@@ -315,6 +315,10 @@ pub struct ViewOptions {
     /// A name that browsers know this machine by, if it is not its host name, such as that of a proxy. May be given several times.
     #[arg(long, value_name = "NAME", value_parser = host_name)]
     pub host: Vec<String>,
+    /// Let pages of other servers read the results: a map of yours that shows terrain.pmtiles, for example. Any page in a browser that reaches
+    /// the server may then read them.
+    #[arg(long)]
+    pub cors: bool,
 }
 
 fn host_name(text: &str) -> Result<String, String> {

@@ -403,7 +403,7 @@ fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
         return Err(sys::Error::Config(tiles::page::NOT_BUILT_IN.into()).into());
     }
     let wanted = std::net::SocketAddr::new(options.address, options.port);
-    let view = View::open(&options.directory, wanted, &options.host)?;
+    let view = View::open(&options.directory, wanted, &options.host, options.cors)?;
     interrupt::listen(exit_code)?;
     if print.quiet && !print.json {
         // Without the URL nobody could use the command: that a browser was started does not mean that it shows.

@@ -181,6 +181,7 @@ mod tests {
             ("[output]", "format", &["3dtiles", "glb", "auto"]),
             ("[output.raster]", "compression", &["deflate", "none"]),
             ("[output.raster]", "products", &["height", "hillshade", "slope", "aspect"]),
+            ("[output.raster]", "pmtiles", &["terrarium", "terrain-rgb"]),
             ("[output]", "copyright", &[]),
         ] {
             assert_eq!(ConfigOption::find(table, key).unwrap().choices(), choices, "{table} {key}");

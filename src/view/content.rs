@@ -16,10 +16,16 @@ pub(super) fn content_type(path: &Path) -> &'static str {
         Some("json") => "application/json",
         Some("glb") => "model/gltf-binary",
         Some("png") => "image/png",
+        Some("terrain") => "application/vnd.quantized-mesh",
         Some("toml" | "txt" | "csv") => "text/plain; charset=utf-8",
         None => "text/plain; charset=utf-8",
         _ => "application/octet-stream",
     }
+}
+
+/// Tells whether a file is packed with gzip, as browsers are to be told: terrain tiles are.
+pub(super) fn is_packed(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending == "terrain")
 }
 
 /// Tells whether gzip makes a file smaller. On the way to this machine itself, only texts are packed: packing a tile takes longer than

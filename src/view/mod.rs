@@ -40,17 +40,18 @@ pub struct View {
 
 impl View {
     /// Opens the port of `wanted` for the terrain in `directory`. Port 0 is any that is free. Browsers may know this machine by the
-    /// names `hosts` too.
+    /// names `hosts` too. Pages of other servers may read the results if `cors` is set.
     ///
     /// # Errors
     /// [`sys::Error::Config`] if no job has written to the directory, the page is not built in, or the address is not one of this machine.
     /// [`verify::Error::Unfinished`] if the job is not done. [`Error::Port`] if another program has the port.
-    pub fn open(directory: &Path, wanted: SocketAddr, hosts: &[String]) -> Result<View> {
+    pub fn open(directory: &Path, wanted: SocketAddr, hosts: &[String], cors: bool) -> Result<View> {
         let terrain = terrain_in(directory)?;
         let root = directory.canonicalize().map_err(sys::Error::io("read", directory))?;
         let listener = TcpListener::bind(wanted).map_err(|error| not_listening(wanted, &error))?;
         let bound = listener.local_addr().map_err(sys::Error::io("listen on", wanted.to_string()))?;
-        let site = Site { results: Results::new(&root), root, page: page_for(terrain)?, hosts: Hosts::new(hosts) };
+        let (results, page, hosts) = (Results::new(&root), page_for(terrain)?, Hosts::new(hosts));
+        let site = Site { results, root, page, hosts, cors };
         // An address such as 0.0.0.0 stands for all of this machine.
         let shown = if wanted.ip().is_unspecified() { "localhost".into() } else { ip_text(wanted.ip()) };
         Ok(View {
@@ -129,7 +130,7 @@ mod tests {
     const HERE: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 
     fn error(directory: &Path, port: u16) -> Error {
-        View::open(directory, SocketAddr::new(HERE, port), &[]).map(|view| view.url).unwrap_err()
+        View::open(directory, SocketAddr::new(HERE, port), &[], false).map(|view| view.url).unwrap_err()
     }
 
     #[test]

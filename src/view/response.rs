@@ -12,7 +12,7 @@ use hyper::header::{HeaderName, HeaderValue};
 use hyper::{Method, StatusCode, Version};
 
 use crate::view::body::Pieces;
-use crate::view::content::{content_type, is_worth_packing};
+use crate::view::content::{content_type, is_packed, is_worth_packing};
 use crate::view::site::{Site, Target};
 
 /// A request. Its body does not matter.
@@ -22,8 +22,30 @@ type Response = hyper::Response<Pieces>;
 
 /// Returns the answer to `request`. `stays_here` tells whether the client is on this machine.
 pub(super) fn response(site: &Site, request: &Request, stays_here: bool) -> Response {
+    let answer = answer(site, request, stays_here);
+    if site.cors { for_all_pages(answer) } else { answer }
+}
+
+/// Returns the answer as pages of other servers may read it. They may ask for parts of files: browsers let them send such a header
+/// without asking first only if it is simple, as `bytes=0-99` is.
+fn for_all_pages(answer: Response) -> Response {
+    let headers = [
+        ("Access-Control-Allow-Origin", "*"),
+        ("Access-Control-Allow-Methods", "GET, HEAD"),
+        ("Access-Control-Allow-Headers", "Range, If-Range, If-None-Match"),
+        ("Access-Control-Expose-Headers", "Accept-Ranges, Content-Length, Content-Range, ETag"),
+        ("Cross-Origin-Resource-Policy", "cross-origin"),
+    ];
+    headers.into_iter().fold(answer, |answer, (name, value)| with(answer, name, value))
+}
+
+fn answer(site: &Site, request: &Request, stays_here: bool) -> Response {
     if !site.hosts.answer_to(header(request, "Host")) {
         return unknown_host(site);
+    }
+    // What browsers ask before a request with other headers (the fetch standard, CORS-preflight).
+    if site.cors && *request.method() == Method::OPTIONS {
+        return text(204, "");
     }
     if !matches!(*request.method(), Method::GET | Method::HEAD) {
         return with(text(405, "only GET and HEAD are answered\n"), "Allow", "GET, HEAD");
@@ -82,6 +104,7 @@ fn file_response(request: &Request, path: &Path, mut file: File, stays_here: boo
         }
         Wanted::All => plain(file, length, 200, kind),
     };
+    let answer = if is_packed(path) { with(answer, "Content-Encoding", "gzip") } else { answer };
     Ok(with(with(answer, "ETag", &tag), "Accept-Ranges", "bytes"))
 }
 

@@ -18,6 +18,8 @@ pub(super) struct Site {
     pub(super) page: String,
     /// Whom it is for.
     pub(super) hosts: Hosts,
+    /// Whether pages of other servers may read the files.
+    pub(super) cors: bool,
 }
 
 /// What a request is for.

@@ -56,6 +56,7 @@ mod levels;
 mod limits;
 mod manual;
 mod many_tiles;
+mod map_tiles;
 mod max_error;
 mod messages;
 mod mistakes;

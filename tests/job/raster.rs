@@ -19,17 +19,17 @@ use crate::tileset::files_below;
 
 /// An image of a raster.
 #[derive(Debug)]
-struct Image {
-    width: usize,
-    height: usize,
-    cells: Vec<f32>,
+pub(crate) struct Image {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) cells: Vec<f32>,
 }
 
 /// A raster as another reader sees it: the raster itself, then its overviews.
-struct Raster {
-    images: Vec<Image>,
+pub(crate) struct Raster {
+    pub(crate) images: Vec<Image>,
     /// The x of the western and the y of the northern edge.
-    corner: [f64; 2],
+    pub(crate) corner: [f64; 2],
     nodata: String,
     keys: Vec<u32>,
 }
@@ -43,7 +43,7 @@ fn bytes(job: &Job) -> Vec<u8> {
     fs::read(job.out().join("terrain.tif")).unwrap()
 }
 
-fn raster(job: &Job) -> Raster {
+pub(crate) fn raster(job: &Job) -> Raster {
     let mut decoder = Decoder::new(BufReader::new(File::open(job.out().join("terrain.tif")).unwrap())).unwrap();
     let place = decoder.get_tag_f64_vec(Tag::Unknown(33922)).unwrap();
     let mut raster = Raster {

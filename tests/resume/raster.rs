@@ -42,6 +42,32 @@ fn files_from_the_tiles_that_were_stopped_anywhere_end_with_the_same_bytes() {
     rig.is_complete("kills after phases");
 }
 
+/// Map tiles are made from the raster: they are made again with it, and alone if nothing else has changed.
+#[test]
+fn map_tiles_that_were_stopped_anywhere_end_with_the_same_bytes() {
+    let on_map = |options: &str| with_raster(options).input("crs = \"EPSG:3857\"");
+    let tiles = on_map("resolution = 15.0, pmtiles = \"terrarium\"");
+    let mut rig = Rig::new(&scattered::uniform(5_000, 20_000, 5), &tiles);
+    for (place, count) in [("drawing", 1), ("drawing", 9), ("waiting_tiles", 1), ("waiting_tiles", 5)] {
+        rig.forget();
+        let what = format!("signal-{place}");
+        rig.run_to(&what, count).stopped(&["error: interrupted"]);
+        rig.has_nothing_half_written(&what);
+        // The raster was complete.
+        assert!(rig.completes(&what)["resumed"].as_u64() >= Some(6));
+    }
+    for options in ["resolution = 15.0, pmtiles = \"terrain-rgb\"", "resolution = 30.0, pmtiles = \"terrarium\""] {
+        rig.forget();
+        rig.configure(&tiles);
+        rig.run_to("signal-waiting_tiles", 2).stopped(&["error: interrupted"]);
+        rig.expect(&on_map(options));
+        let said = rig.run().succeeded().err;
+        assert!(said.contains("; the tiles stay"), "{said}");
+        assert_eq!(said.contains("[output.raster] pmtiles"), options.contains("terrain-rgb"), "{said}");
+        rig.is_complete(options);
+    }
+}
+
 #[test]
 fn another_raster_keeps_the_tiles() {
     let mut rig = rig();

@@ -53,6 +53,11 @@ impl Setup {
     }
 
     /// Adds a line to `[output]`.
+    pub(crate) fn input(mut self, line: &str) -> Setup {
+        self.input += &format!("\n{line}");
+        self
+    }
+
     pub(crate) fn output(mut self, line: &str) -> Setup {
         self.output += &format!("\n{line}");
         self

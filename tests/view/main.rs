@@ -3,6 +3,7 @@
 
 mod clicks;
 mod looks;
+mod map_tiles;
 mod rig;
 
 use std::process::Command;

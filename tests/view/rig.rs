@@ -139,8 +139,14 @@ pub(crate) struct Server {
 
 impl Server {
     pub(crate) fn start(out: &Path) -> Server {
+        Server::with(out, &[])
+    }
+
+    /// The same, with more options.
+    pub(crate) fn with(out: &Path, options: &[&str]) -> Server {
         let mut program = Command::new(PROGRAM)
             .args(["view", "--no-open", "--quiet"])
+            .args(options)
             .arg(out)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())

@@ -50,6 +50,8 @@ pub enum JobStep {
     Levels,
     /// Writes the raster of heights.
     Raster,
+    /// Writes the map tiles of heights, from the raster.
+    MapTiles,
     /// Writes the mesh for CAD and other programs.
     Exports,
     /// Writes the contour lines.
@@ -58,7 +60,7 @@ pub enum JobStep {
     Terrain,
     /// Writes the inputs with the classes that the job has found.
     Classified,
-    /// Writes what is beside the tiles, except the raster, the contour lines and the report.
+    /// Writes what is beside the tiles, except the raster, the map tiles, the contour lines and the report.
     Publish,
     /// Writes the report: the job is complete.
     Report,

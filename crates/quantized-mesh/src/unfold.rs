@@ -71,7 +71,7 @@ fn flip_all(triangles: &mut [[u32; 3]], area: &dyn Fn(&[u32; 3]) -> i64) {
                     owners.remove(&[q, p]);
                     for (number, [u, v, w]) in [(t, made[0]), (beside, made[1])] {
                         triangles[number] = [u, v, w];
-                        [[u, v], [v, w], [w, u]].into_iter().for_each(|edge| drop(owners.insert(edge, number)));
+                        owners.extend([[u, v], [v, w], [w, u]].map(|edge| (edge, number)));
                     }
                     is_changed = true;
                     break;

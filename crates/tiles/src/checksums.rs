@@ -30,6 +30,11 @@ impl Checksum {
         Checksum(xxh3_128(bytes))
     }
 
+    /// Returns the checksum as a number.
+    pub fn number(self) -> u128 {
+        self.0
+    }
+
     /// Returns the checksum of all bytes that went into `hasher`.
     pub fn of_hasher(hasher: &Xxh3) -> Checksum {
         Checksum(hasher.digest128())

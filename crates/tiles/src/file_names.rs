@@ -146,6 +146,11 @@ impl OutputFiles {
         self.directory.join(format!("{}.vrt", product.names()[0]))
     }
 
+    /// Returns the heights as map tiles.
+    pub fn map_tiles(&self) -> PathBuf {
+        self.directory.join("terrain.pmtiles")
+    }
+
     /// Returns the contour lines for CAD programs.
     pub fn contour_drawing(&self) -> PathBuf {
         self.directory.join("contours.dxf")

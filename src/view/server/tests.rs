@@ -30,11 +30,11 @@ impl Answer {
 
 impl Rig {
     fn new() -> Rig {
-        Rig::with_stillness(STILLNESS)
+        Rig::with(STILLNESS, false)
     }
 
-    /// Clients may take nothing of an answer for so long.
-    fn with_stillness(stillness: Duration) -> Rig {
+    /// Clients may take nothing of an answer for so long, and pages of other servers may read the files if `cors` is set.
+    fn with(stillness: Duration, cors: bool) -> Rig {
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path().canonicalize().unwrap().join("out");
         std::fs::create_dir_all(root.join("tiles")).unwrap();
@@ -45,7 +45,7 @@ impl Rig {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         let address = listener.local_addr().unwrap();
         let hosts = Hosts::new(&["maps.example".into()]);
-        let site = Site { results: Results::new(&root), root, page: "<p>the page".into(), hosts };
+        let site = Site { results: Results::new(&root), root, page: "<p>the page".into(), hosts, cors };
         let server = Server { stillness, ..Server::new(listener, site).unwrap() };
         thread::spawn(move || server.run());
         Rig { folder, address }
@@ -73,6 +73,29 @@ impl Rig {
     fn get(&self, path: &str) -> Answer {
         self.ask(&format!("GET {path}"), "")
     }
+}
+
+#[test]
+fn pages_of_other_servers_read_files_only_if_the_user_wants_that() {
+    let (own, all) = (Rig::new(), Rig::with(STILLNESS, true));
+    let part = "Range: bytes=8-11\r\nOrigin: https://maps.example\r\n";
+    let answer = own.ask("GET /tiles/000000.glb", part);
+    assert_eq!((answer.status, answer.header("Access-Control-Allow-Origin")), (206, None));
+    assert_eq!(answer.header("Cross-Origin-Resource-Policy"), Some("same-origin"));
+    let answer = all.ask("GET /tiles/000000.glb", part);
+    assert_eq!((answer.status, answer.header("Access-Control-Allow-Origin")), (206, Some("*")));
+    assert_eq!(answer.header("Cross-Origin-Resource-Policy"), Some("cross-origin"));
+    assert_eq!(answer.header("Content-Range"), Some("bytes 8-11/400000"));
+    assert!(answer.header("Access-Control-Expose-Headers").unwrap().contains("Content-Range"));
+    assert_eq!(answer.body, tile()[8..12]);
+    // A page sees why it gets nothing, and what it may ask.
+    assert_eq!(all.get("/nothing").header("Access-Control-Allow-Origin"), Some("*"));
+    let before = all.ask("OPTIONS /tiles/000000.glb", "Access-Control-Request-Method: GET\r\n");
+    assert_eq!((before.status, before.header("Access-Control-Allow-Origin")), (204, Some("*")));
+    assert!(before.header("Access-Control-Allow-Headers").unwrap().contains("Range"));
+    assert_eq!(own.ask("OPTIONS /tiles/000000.glb", "").status, 405);
+    // Names that a page may have given itself stay out.
+    assert_eq!(all.ask("GET /tiles/000000.glb", "Host: evil.example\r\n").status, 403);
 }
 
 fn tile() -> Vec<u8> {
@@ -314,7 +337,7 @@ const LARGE: u64 = 32 << 20;
 
 #[test]
 fn clients_that_never_read_lose_their_places() {
-    let rig = Rig::with_stillness(Duration::from_millis(300));
+    let rig = Rig::with(Duration::from_millis(300), false);
     std::fs::File::create(rig.out().join("large.glb")).unwrap().set_len(LARGE).unwrap();
     let still: Vec<TcpStream> = (0..MOST_CONNECTIONS).map(|_| asks_for_much(&rig)).collect();
     assert_eq!(rig.get("/report.json").status, 200);
@@ -326,7 +349,7 @@ fn clients_that_never_read_lose_their_places() {
 
 #[test]
 fn clients_that_read_slowly_get_all() {
-    let rig = Rig::with_stillness(Duration::from_secs(3));
+    let rig = Rig::with(Duration::from_secs(3), false);
     std::fs::File::create(rig.out().join("large.glb")).unwrap().set_len(LARGE).unwrap();
     let (mut stream, mut piece, mut total) = (asks_for_much(&rig), vec![0; 1 << 20], 0);
     // This takes longer than a client may take nothing.

@@ -92,6 +92,11 @@ impl CrsTransform {
         found.iter().all(|value| value.is_finite()).then_some(found)
     }
 
+    /// Returns the way back.
+    pub(crate) fn reversed(self) -> CrsTransform {
+        CrsTransform { from: self.to, to: self.from, datums: self.datums }
+    }
+
     /// Returns what it does, in words.
     pub fn way(&self) -> String {
         let name = |of: &Coordinates| of.projection.as_ref().map(|projection| projection.label().to_string());

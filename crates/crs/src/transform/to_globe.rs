@@ -1,4 +1,4 @@
-//! The way of places on a map to the longitude and latitude of WGS 84, where the globes of viewers lie.
+//! The way of places on a map to the longitude and latitude of WGS 84, where the globes of viewers lie, and back.
 //!
 //! A datum that is some metres off comes with a shift, from the definition of the system in the form of PROJ.4. All shifts of this program
 //! are seven numbers (EPSG method 9606, position vector): earth-centred coordinates are moved, turned and scaled.
@@ -17,6 +17,9 @@ const SECOND: f64 = DEGREE / 3600.0;
 
 /// Each round finds two digits more of the latitude.
 const ROUNDS: usize = 9;
+
+/// Each round of the way back through a shift finds four digits more: a shift moves places by a ten-thousandth of a radian at most.
+const ROUNDS_BACK: usize = 5;
 
 /// The shifts to WGS 84 of datums that PROJ has names for: metres, seconds of arc, millionths.
 const NAMED: [(&str, [f64; 7]); 9] = [
@@ -59,6 +62,7 @@ const ELSEWHERE: &str =
 #[derive(Clone, Debug)]
 pub struct GlobeWay {
     to_degrees: CrsTransform,
+    from_degrees: CrsTransform,
     /// Units of the system in a unit of x and y.
     scale: f64,
     /// Nothing where longitude and latitude are those of WGS 84 already.
@@ -81,21 +85,33 @@ impl GlobeWay {
         }
         let ellipsoid = datum.ellipsoid().and_then(Ellipsoid::of);
         let ellipsoid = ellipsoid.ok_or_else(|| format!("{} has no ellipsoid", crs.label()))?;
-        Ok(GlobeWay { to_degrees, scale: metres / own, shift: Shift::of(definition, ellipsoid)? })
+        let from_degrees = to_degrees.clone().reversed();
+        Ok(GlobeWay { to_degrees, from_degrees, scale: metres / own, shift: Shift::of(definition, ellipsoid)? })
     }
 
     /// Returns longitude and latitude in radians; `None` if the map has no such place.
     pub fn geographic(&self, place: [f64; 2]) -> Option<[f64; 2]> {
         let place = self.to_degrees.apply(place.map(|value| value * self.scale))?.map(|degrees| degrees * DEGREE);
         let [longitude, latitude] = self.shift.as_ref().map_or(place, |shift| shift.apply(place));
-        let turns = if longitude > PI {
-            -2.0 * PI
-        } else if longitude < -PI {
-            2.0 * PI
-        } else {
-            0.0
-        };
-        Some([longitude + turns, latitude])
+        Some([within_half_a_turn(longitude), latitude])
+    }
+
+    /// Returns x and y of a place by longitude and latitude in radians; `None` if the map has no such place.
+    pub fn place(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        let own = self.shift.as_ref().map_or(place, |shift| shift.undone(place));
+        let place = self.from_degrees.apply(own.map(|radians| radians / DEGREE))?;
+        Some(place.map(|value| value / self.scale))
+    }
+}
+
+/// Returns an angle of less than a turn and a half as one of half a turn at most, in radians.
+fn within_half_a_turn(angle: f64) -> f64 {
+    if angle > PI {
+        angle - 2.0 * PI
+    } else if angle < -PI {
+        angle + 2.0 * PI
+    } else {
+        angle
     }
 }
 
@@ -142,6 +158,14 @@ impl Shift {
         let turned = [x - turn_z * y + turn_y * z, turn_z * x + y - turn_x * z, z - turn_y * x + turn_x * y];
         let [x, y, z] = [0, 1, 2].map(|k| self.metres[k] + self.scale * turned[k]);
         [libm::atan2(y, x), self.latitude((x * x + y * y).sqrt(), z)]
+    }
+
+    /// Returns the place that [`Shift::apply`] leads to `place`.
+    fn undone(&self, place: [f64; 2]) -> [f64; 2] {
+        (0..ROUNDS_BACK).fold(place, |guess, _| {
+            let [longitude, latitude] = self.apply(guess);
+            [guess[0] + within_half_a_turn(place[0] - longitude), guess[1] + (place[1] - latitude)]
+        })
     }
 
     /// Returns the latitude of a place by its distances from the axis and from the plane of the equator.
@@ -270,6 +294,31 @@ mod tests {
         for (code, at) in [(27572, [600_000.0, 2_427_000.0]), (29702, [513_000.0, 799_000.0])] {
             let off = off(code, at);
             assert!(off < 7e-11, "EPSG:{code}: {off} radians");
+        }
+    }
+
+    #[test]
+    fn the_way_back_leads_to_the_same_place() {
+        for (code, at) in [
+            (27700, [530_000.0, 180_000.0]),
+            (31467, [3_500_000.0, 5_500_000.0]),
+            (28992, [155_000.0, 463_000.0]),
+            (2277, [2_300_000.0, 10_000_000.0]),
+            (3857, [1_500_000.0, 6_000_000.0]),
+            (3413, [100_000.0, -1_500_000.0]),
+            (2056, [2_683_000.0, 1_247_000.0]),
+            (5514, [-743_000.0, -1_043_000.0]),
+            (27572, [600_000.0, 2_427_000.0]),
+            // Across the 180th meridian.
+            (32660, [830_000.0, 100_000.0]),
+        ] {
+            let (way, _) = way(code);
+            for i in 0..100 {
+                let place = [at[0] + f64::from(i % 10) * 997.0, at[1] - f64::from(i / 10) * 1013.0];
+                let back = way.place(way.geographic(place).unwrap()).unwrap();
+                let off = (back[0] - place[0]).abs().max((back[1] - place[1]).abs());
+                assert!(off < 2e-6, "EPSG:{code}: {off}");
+            }
         }
     }
 

@@ -144,7 +144,7 @@ pub fn find_pending(path: &Path) -> Result<PendingFile> {
 /// Returns the name under which the file at `path` waits until it is whole.
 pub fn partial_path(path: &Path) -> PathBuf {
     // A world file has the name of its picture but for the ending, and others that of the scene of all tiles.
-    const SAME_NAMES: [&str; 6] = ["pgw", "tif", "xml", "dxf", "obj", "ply"];
+    const SAME_NAMES: [&str; 7] = ["pgw", "tif", "pmtiles", "xml", "dxf", "obj", "ply"];
     let ending = path.extension().and_then(|ending| SAME_NAMES.into_iter().find(|same| ending == *same));
     match ending {
         Some(ending) => path.with_extension(format!("{ending}.partial")),

@@ -93,6 +93,11 @@ impl JobDirectory {
         self.job.join(format!("{}.blocks", product.names()[1]))
     }
 
+    /// Returns the path of the file in which map tiles wait.
+    pub fn waiting_map_tiles(&self) -> PathBuf {
+        self.job.join("map.tiles")
+    }
+
     /// Returns the paths of the files in which the numbered mesh waits for its exports: vertices and triangles.
     pub fn exported_mesh(&self) -> [PathBuf; 2] {
         ["exports.vertices", "exports.triangles"].map(|name| self.job.join(name))

@@ -38,6 +38,7 @@ impl Leftovers {
             output.breaklines(),
             output.preview(),
             output.preview_world(),
+            output.map_tiles(),
             output.contours(),
             output.contour_drawing(),
             output.terrain_layer(),

@@ -86,16 +86,21 @@ pub struct Fingerprint {
 
 /// The names of options among those of the style that no tile depends on: what they ask for is made from the finished tiles, each by a step
 /// of its own.
-const FROM_TILES: [(&str, JobStep); 4] = [
-    ("[output] raster", JobStep::Raster),
-    ("[output] contours", JobStep::Contours),
-    ("[output] export", JobStep::Exports),
-    ("[output] terrain", JobStep::Terrain),
+const FROM_TILES: [(&str, &[JobStep]); 5] = [
+    // Map tiles are made from the raster.
+    ("[output] raster", &[JobStep::Raster, JobStep::MapTiles]),
+    (MAP_TILES, &[JobStep::MapTiles]),
+    ("[output] contours", &[JobStep::Contours]),
+    ("[output] export", &[JobStep::Exports]),
+    ("[output] terrain", &[JobStep::Terrain]),
 ];
 
-/// Returns the step that makes what an option asks for from the finished tiles, if it is one of these.
-fn step_of(option: &str) -> Option<JobStep> {
-    FROM_TILES.iter().find(|(name, _)| *name == option).map(|(_, step)| *step)
+/// The name of the option for map tiles, which stands in a table of its own: the raster stays when it changes.
+const MAP_TILES: &str = "[output.raster] pmtiles";
+
+/// Returns the steps that make what an option asks for from the finished tiles, if it is one of these.
+fn steps_of(option: &str) -> Option<&'static [JobStep]> {
+    FROM_TILES.iter().find(|(name, _)| *name == option).map(|(_, steps)| *steps)
 }
 
 /// What to do about a job that is no longer what tasks planned.
@@ -247,8 +252,8 @@ impl Fingerprint {
         let style = changed_values(&earlier.style, &self.style);
         match (mesh.is_empty(), style.is_empty()) {
             (false, _) => JobChange::Mesh(first_few(mesh)),
-            (true, false) if style.iter().all(|name| step_of(name).is_some()) => {
-                let steps = style.iter().filter_map(|name| step_of(name)).collect();
+            (true, false) if style.iter().all(|name| steps_of(name).is_some()) => {
+                let steps = style.iter().filter_map(|name| steps_of(name)).flatten().copied().collect();
                 JobChange::FromTiles { what: first_few(style), steps }
             }
             (true, false) => JobChange::Style(first_few(style)),
@@ -270,6 +275,10 @@ impl Fingerprint {
 /// Returns the options that only the style of the tiles depends on. A geoid grid counts by its content: it may lie elsewhere now.
 fn style_of(output: &OutputOptions) -> Result<Map<String, Value>> {
     let mut style = named_values(output, "output", &["directory", "max_error"])?;
+    let raster = style.get_mut("[output] raster").and_then(Value::as_object_mut);
+    if let Some(encoding) = raster.and_then(|raster| raster.remove("pmtiles")) {
+        style.insert(MAP_TILES.into(), encoding);
+    }
     if let Some(grid) = output.height_offset.as_ref().and_then(HeightOffset::grid) {
         require_file(grid)?;
         let content = Checksum::of_file(grid).map_err(|e| not_opened(grid, e))?.1;

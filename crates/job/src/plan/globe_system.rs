@@ -8,12 +8,25 @@ use tiles::tiles3d::globe::GlobeSystem;
 /// # Errors
 /// A sentence if it leads to no longitude and latitude that this program computes.
 pub(crate) fn globe_system(crs: &Crs, metres: f64) -> Result<GlobeSystem, String> {
-    let definition = crs.proj4_definition().ok_or_else(|| match &crs.name {
-        Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
-        None => "no input names its coordinate system".to_string(),
-    })?;
+    let definition = definition(crs)?;
     let way = GlobeWay::of(crs, &definition, metres)?;
     Ok(GlobeSystem { definition: with_unit(&definition, metres), way: Box::new(move |place| way.geographic(place)) })
+}
+
+/// Returns the way of `crs`, with coordinates in units of `metres`, to the globe and back.
+///
+/// # Errors
+/// As [`globe_system`].
+pub(crate) fn globe_way(crs: &Crs, metres: f64) -> Result<GlobeWay, String> {
+    GlobeWay::of(crs, &definition(crs)?, metres)
+}
+
+/// Returns the definition of `crs` in the form of PROJ.4.
+fn definition(crs: &Crs) -> Result<String, String> {
+    crs.proj4_definition().ok_or_else(|| match &crs.name {
+        Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
+        None => "no input names its coordinate system".to_string(),
+    })
 }
 
 /// Returns the system of `definition` with coordinates in units of `metres`. A file may say another unit than the code that it names.

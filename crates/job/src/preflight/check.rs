@@ -18,6 +18,7 @@ use crate::preflight::selection_estimate::estimated_vertices;
 use crate::progress::number_text::{grouped, mebibytes};
 use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
+use crate::publish::map_tiles::check::check_map_tiles;
 use crate::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::publish::raster::check::{check_raster, planned_raster};
 use crate::publish::terrain_tiles::check::check_terrain;
@@ -126,6 +127,7 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
     check_raster(&plan)?;
+    check_map_tiles(&plan)?;
     check_contours(&plan)?;
     check_terrain(&plan)?;
     let threads = workers(options, plan.records)?;

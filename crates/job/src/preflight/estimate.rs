@@ -10,6 +10,8 @@ use crate::plan::job_plan::{Plan, PlannedInput};
 use crate::preflight::kept_points::{KeptPoints, has_filter};
 use crate::publish::contours::write_contours::contour_memory;
 use crate::publish::exports::export_limits::most_triangles;
+use crate::publish::map_tiles::check::planned_map_tiles;
+use crate::publish::map_tiles::write_map_tiles::map_tile_memory;
 use crate::publish::raster::check::planned_raster;
 use crate::publish::raster::write_raster::raster_memory;
 use crate::publish::terrain_tiles::write_terrain::terrain_memory;
@@ -80,13 +82,13 @@ impl DiskEstimate {
         let pixels = preview_pixels(plan);
         let border = border_bytes(points, per_tile, tiles) + pixels * size_of::<PreviewPixel>() as u64 + OWN_FILES;
         let store = leaves + border;
-        let raster = raster_bytes(plan);
+        let (raster, map_tiles) = (raster_bytes(plan), map_tile_bytes(plan));
         let in_tiles = tile_bytes(points, tiles, &options.output, max_one_file, points > per_tile);
         let page = if options.output.page { PAGE } else { 0 };
         let (exports, mesh) = export_bytes(points, &options.output);
-        let results = in_tiles + pixels * PREVIEW_PER_PIXEL + page + raster + exports;
-        // The raster goes together before the mesh is numbered.
-        let beside = raster.max(mesh);
+        let results = in_tiles + pixels * PREVIEW_PER_PIXEL + page + raster + map_tiles + exports;
+        // The raster goes together before the map tiles, and these before the mesh is numbered.
+        let beside = raster.max(map_tiles).max(mesh);
         // Leaves go while the results grow, unless all stay.
         let keeps_leaves = options.output.max_edge == MaxEdge::Auto || plan.keeps_mesh();
         let most = if keeps_leaves { store } else { border + waiting_leaves(plan, points, leaves, tiles) };
@@ -163,6 +165,12 @@ fn raster_bytes(plan: &Plan) -> u64 {
     options.products.iter().map(of_product).sum()
 }
 
+/// Returns the bytes of the map tiles. While the archive is put together, its tiles take as many once more.
+fn map_tile_bytes(plan: &Plan) -> u64 {
+    // Two bytes for a pixel of rough terrain, and a third more for coarser zooms.
+    planned_map_tiles(plan).map_or(0, |(_, pixels)| pixels * 8 / 3)
+}
+
 /// Returns the bytes of the exports of a mesh of so many points, and those of the numbered mesh that they are written from. A format that
 /// has too many triangles is not written.
 fn export_bytes(points: u64, output: &OutputOptions) -> (u64, u64) {
@@ -198,6 +206,7 @@ pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
             .max(levels)
             .max(buffers)
             .max(raster_memory(plan, threads))
+            .max(map_tile_memory(plan, threads))
             .max(contour_memory(plan, threads))
             .max(terrain_memory(plan, threads))
 }

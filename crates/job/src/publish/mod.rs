@@ -5,6 +5,7 @@ pub(crate) mod contours;
 pub(crate) mod exports;
 pub(crate) mod flat_tile;
 pub(crate) mod height_offset_check;
+pub(crate) mod map_tiles;
 pub(crate) mod one_file_limits;
 pub(crate) mod placement;
 pub(crate) mod raster;

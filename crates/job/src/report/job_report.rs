@@ -12,6 +12,7 @@ use crate::progress::number_text::grouped;
 use crate::progress::stats::StageStats;
 use crate::publish::contours::write_contours::ContourStats;
 use crate::publish::exports::write_exports::ExportedFile;
+use crate::publish::map_tiles::write_map_tiles::MapTileStats;
 use crate::publish::raster::write_raster::RasterStats;
 use crate::publish::terrain_tiles::write_terrain::TerrainStats;
 use crate::report::breakline_report::BreaklineReport;
@@ -64,6 +65,9 @@ pub struct Report {
     /// The raster of heights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub raster: Option<RasterStats>,
+    /// The map tiles of heights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pmtiles: Option<MapTileStats>,
     /// The files with the mesh for CAD and other programs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exports: Vec<ExportedFile>,
@@ -230,6 +234,8 @@ pub struct ReportParts {
     pub levels: LevelStats,
     /// The raster.
     pub raster: Option<RasterStats>,
+    /// The map tiles of heights.
+    pub pmtiles: Option<MapTileStats>,
     /// The mesh for other programs.
     pub exports: Vec<ExportedFile>,
     /// The contour lines.
@@ -307,6 +313,7 @@ impl Report {
             tiles: parts.tiles.files,
             levels: parts.levels,
             raster: parts.raster,
+            pmtiles: parts.pmtiles,
             exports: parts.exports,
             contours: parts.contours,
             terrain: parts.terrain,

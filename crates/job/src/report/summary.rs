@@ -87,7 +87,7 @@ impl<'a> Summary<'a> {
         let output = OutputFiles::new(&self.output.directory);
         let mut paths = vec![output.tileset(), output.terrain(), output.page(), output.preview()];
         paths.extend(PRODUCTS.into_iter().flat_map(|product| [output.raster(product), output.raster_list(product)]));
-        paths.extend([output.contours(), output.contour_drawing()]);
+        paths.extend([output.map_tiles(), output.contours(), output.contour_drawing()]);
         paths.extend(ExportFormat::ALL.map(|format| output.export(format)));
         paths.push(output.terrain_layer());
         paths.push(output.classified().0);

@@ -1,6 +1,7 @@
 //! The report as a table of all figures, for `--verbose`. [`crate::report::summary`] has what everyone should see.
 
 use crate::progress::number_text::{grouped, precise_mebibytes};
+use crate::publish::map_tiles::write_map_tiles::MapTileStats;
 use crate::report::breakline_report::BreaklineReport;
 use crate::report::job_report::{Report, SlowestPart, StepSeconds};
 use crate::report::selection_report::SelectionReport;
@@ -102,6 +103,10 @@ impl fmt::Display for Report {
             let products: Vec<&str> = raster.products.iter().map(|product| product.names()[0]).collect();
             let (products, bytes) = (products.join(", "), precise_mebibytes(raster.bytes));
             row("raster", format!("{columns} x {rows} cells ({products}), {bytes}"))?;
+        }
+        if let Some(MapTileStats { encoding, max_zoom, tiles, bytes }) = self.pmtiles {
+            let (tiles, bytes) = (grouped(tiles), precise_mebibytes(bytes));
+            row("map tiles", format!("{tiles} of zoom 0 to {max_zoom} ({}), {bytes}", encoding.name()))?;
         }
         for export in &self.exports {
             row("export", format!("{}, {}", export.file, precise_mebibytes(export.bytes)))?;

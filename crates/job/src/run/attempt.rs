@@ -16,6 +16,7 @@ use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
 use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
+use crate::publish::map_tiles::check::check_map_tiles;
 use crate::publish::raster::check::check_raster;
 use crate::publish::terrain_tiles::check::check_terrain;
 use crate::report::job_report::Report;
@@ -181,6 +182,7 @@ fn attempt(
     plan.warnings.extend(job.modified.clone());
     check_height_offset(&plan)?;
     check_raster(&plan)?;
+    check_map_tiles(&plan)?;
     check_contours(&plan)?;
     check_terrain(&plan)?;
     stage.advance(1);

@@ -186,6 +186,7 @@ impl EarlierRun {
         let mut of_job = vec![
             JobStep::Plan,
             JobStep::Raster,
+            JobStep::MapTiles,
             JobStep::Contours,
             JobStep::Terrain,
             JobStep::Exports,

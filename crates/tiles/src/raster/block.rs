@@ -1,4 +1,4 @@
-//! Packing a block: the predictor for floating-point numbers (Adobe, "TIFF Technical Note 3") or for bytes, then DEFLATE.
+//! Packing a block, and unpacking one of heights: the predictor for floating-point numbers (Adobe, "TIFF Technical Note 3") or for bytes, then DEFLATE.
 //!
 //! The coder is `miniz_oxide` itself, not `flate2`, whose coder other crates of a build can exchange: the bytes of a file must not depend
 //! on that.
@@ -9,6 +9,7 @@ use crate::raster::products::RasterProduct;
 use miniz_oxide::deflate::core::{
     CompressionStrategy, CompressorOxide, TDEFLFlush, compress_to_output, create_comp_flags_from_zip_params,
 };
+use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
 
 /// With the strategy below it only says that a run may begin a byte later if it is longer then.
 const LEVEL: i32 = 6;
@@ -24,6 +25,37 @@ pub fn packed(cells: &[f32], product: RasterProduct, compression: RasterCompress
         (RasterCompression::Deflate, true) => deflated(&differences(bytes(cells))),
         (RasterCompression::None, true) => bytes(cells),
     }
+}
+
+/// Returns the heights of a packed block; `None` if the bytes are no such block.
+pub(crate) fn unpacked(bytes: &[u8], compression: RasterCompression) -> Option<Vec<f32>> {
+    const BYTES: usize = BLOCK * BLOCK * size_of::<f32>();
+    match compression {
+        RasterCompression::Deflate => {
+            let bytes = decompress_to_vec_zlib_with_limit(bytes, BYTES).ok()?;
+            (bytes.len() == BYTES).then(|| restored(bytes))
+        }
+        RasterCompression::None => {
+            let (numbers, rest) = bytes.as_chunks::<4>();
+            let is_whole = numbers.len() == BLOCK * BLOCK && rest.is_empty();
+            is_whole.then(|| numbers.iter().map(|number| f32::from_le_bytes(*number)).collect())
+        }
+    }
+}
+
+/// Undoes [`predicted`].
+fn restored(mut bytes: Vec<u8>) -> Vec<f32> {
+    let mut cells = Vec::with_capacity(BLOCK * BLOCK);
+    for row in bytes.chunks_exact_mut(4 * BLOCK) {
+        let mut last = 0u8;
+        for byte in row.iter_mut() {
+            last = last.wrapping_add(*byte);
+            *byte = last;
+        }
+        let number = |n: usize| f32::from_be_bytes([0, 1, 2, 3].map(|place| row[place * BLOCK + n]));
+        cells.extend((0..BLOCK).map(number));
+    }
+    cells
 }
 
 fn bytes(cells: &[f32]) -> Vec<u8> {

@@ -6,6 +6,7 @@
 //! not depend on the tiles, their order or the threads.
 
 pub mod block;
+pub mod block_reader;
 pub mod file_list;
 pub mod geokeys;
 pub mod geotiff;

@@ -1,5 +1,6 @@
 //! The options of `[output.raster]`.
 
+use crate::map_tiles::encoding::HeightEncoding;
 use crate::raster::BLOCK;
 use crate::raster::products::RasterProducts;
 use lattice::shortest_decimal;
@@ -27,6 +28,9 @@ pub struct RasterOptions {
     /// The side of a file in cells, for a grid of files instead of one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cells_per_file: Option<FileSide>,
+    /// How the heights are written as map tiles too; none if the user says nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pmtiles: Option<HeightEncoding>,
 }
 
 /// The side of a file of a grid of files in cells.

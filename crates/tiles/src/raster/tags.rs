@@ -31,7 +31,8 @@ impl TiffKind {
         bytes.extend_from_slice(&value.to_le_bytes()[..self.offset_bytes()]);
     }
 
-    fn count_bytes(self) -> usize {
+    /// Returns the bytes of the number of entries of a directory.
+    pub(crate) fn count_bytes(self) -> usize {
         match self {
             TiffKind::Classic => 2,
             TiffKind::Big => 8,

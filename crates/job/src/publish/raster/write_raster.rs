@@ -100,6 +100,11 @@ impl<'a> RasterWork<'a> {
         Ok(Some(RasterWork { plan, options, frame, grid, boxes, tiles }))
     }
 
+    /// Returns where the cells are.
+    pub(crate) fn grid(&self) -> &RasterGrid {
+        &self.grid
+    }
+
     /// Returns the number of blocks of the raster itself.
     pub(crate) fn blocks(&self) -> u64 {
         let of_part =

@@ -14,6 +14,7 @@ use crate::publish::classified::{ClassifiedInputs, write_all};
 use crate::publish::contours::write_contours::{ContourStats, ContourWork};
 use crate::publish::exports::write_exports::{ExportWork, ExportedFile, Exports};
 use crate::publish::flat_tile::FlatScene;
+use crate::publish::map_tiles::write_map_tiles::{MapTileStats, MapTileWork};
 use crate::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::publish::placement::{heights_warning, place, placement_warning};
 use crate::publish::raster::write_raster::{RasterStats, RasterWork};
@@ -257,6 +258,7 @@ struct Published {
     bytes: u64,
     levels: LevelStats,
     raster: Option<RasterStats>,
+    map_tiles: Option<MapTileStats>,
     contours: Option<ContourStats>,
     exports: Vec<ExportedFile>,
     terrain: Option<TerrainStats>,
@@ -295,7 +297,10 @@ fn publish(
     tileset: Option<TilesetContent>,
 ) -> Result<Published> {
     let plan = job.plan;
-    let raster = write_raster(run, plan, &appearance.style.frame, written.tiles)?;
+    let raster_work = RasterWork::of(plan, &appearance.style.frame, written.tiles)?;
+    let raster = raster_work.as_ref().map(|work| write_raster(run, work)).transpose()?;
+    let map_tiles = raster_work.as_ref().map(|work| write_map_tiles(run, plan, work)).transpose()?.flatten();
+    drop(raster_work);
     let contours = write_contours(run, plan, &appearance.style.frame, written.tiles)?;
     let exports = write_exports(run, plan, &appearance.style.frame, written)?;
     let terrain = write_terrain(run, plan, &appearance.style.frame, written.tiles)?;
@@ -351,12 +356,13 @@ fn publish(
     stage.advance(1);
     run.add_stage(stage.finish());
     let exported: u64 = exports.files.iter().map(|file| file.bytes).sum();
-    let rasters_and_lines = raster.map_or(0, |raster| raster.bytes) + contours.map_or(0, |lines| lines.bytes);
+    let rasters = raster.map_or(0, |raster| raster.bytes) + map_tiles.map_or(0, |tiles| tiles.bytes);
+    let rasters_and_lines = rasters + contours.map_or(0, |lines| lines.bytes);
     let bytes =
         bytes + rasters_and_lines + exported + classified.bytes + terrain.as_ref().map_or(0, |tiles| tiles.bytes);
     warnings.extend(exports.warnings);
     warnings.extend(classified.warnings);
-    Ok(Published { bytes, levels: stats, raster, contours, exports: exports.files, terrain, warnings })
+    Ok(Published { bytes, levels: stats, raster, map_tiles, contours, exports: exports.files, terrain, warnings })
 }
 
 /// The raster of a job.
@@ -366,16 +372,27 @@ struct WrittenRaster {
     warnings: Vec<String>,
 }
 
-/// Writes the raster, if the user wants one. The scene of the tiles is that of `frame`.
+/// Writes the raster.
 ///
 /// # Errors
 /// Those of [`RasterWork`].
-fn write_raster(run: &WholeRun, plan: &Plan, frame: &Frame, tiles: &dyn EachTile) -> Result<Option<WrittenRaster>> {
-    let Some(work) = RasterWork::of(plan, frame, tiles)? else { return Ok(None) };
+fn write_raster(run: &WholeRun, work: &RasterWork) -> Result<WrittenRaster> {
     let stage = run.progress.stage("raster", work.blocks(), "blocks");
     let stats = run.journal.step(JobStep::Raster, || work.write(run.directory, &|| stage.advance(1)))?;
     run.add_stage(stage.finish());
-    Ok(Some(WrittenRaster { warnings: work.warnings(run.directory, &stats)?, stats }))
+    Ok(WrittenRaster { warnings: work.warnings(run.directory, &stats)?, stats })
+}
+
+/// Writes map tiles from the raster, if the user wants some.
+///
+/// # Errors
+/// Those of [`MapTileWork`].
+fn write_map_tiles(run: &WholeRun, plan: &Plan, raster: &RasterWork) -> Result<Option<MapTileStats>> {
+    let Some(work) = MapTileWork::of(plan, raster.grid())? else { return Ok(None) };
+    let stage = run.progress.stage("map tiles", work.tiles(), "tiles");
+    let stats = run.journal.step(JobStep::MapTiles, || work.write(run.directory, &|| stage.advance(1)))?;
+    run.add_stage(stage.finish());
+    Ok(Some(stats))
 }
 
 /// Writes contour lines, if the user wants some. The scene of the tiles is that of `frame`.
@@ -468,6 +485,7 @@ fn write_report(
         tiles: figures.tiles,
         levels: published.levels,
         raster: published.raster,
+        pmtiles: published.map_tiles,
         contours: published.contours,
         exports: published.exports,
         terrain: published.terrain,

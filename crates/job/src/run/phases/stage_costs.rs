@@ -1,6 +1,7 @@
 //! What the stages of a job usually cost, for the estimate of the time left.
 
 use crate::plan::job_plan::Plan;
+use crate::publish::map_tiles::check::planned_map_tiles;
 use crate::publish::raster::check::planned_raster;
 use points::FileFormat;
 
@@ -19,6 +20,9 @@ const EXPORT: f64 = 400.0;
 /// The same for each cell of a raster, and for each that is stored: with those of overviews, and those that only fill blocks.
 const RASTER: f64 = 170.0;
 const RASTER_STORED: f64 = 60.0;
+
+/// The same for each pixel of map tiles of the finest zoom.
+const MAP_TILES: f64 = 130.0;
 
 /// The same for each point of contour lines: it depends on how many there are.
 const CONTOURS: f64 = 250.0;
@@ -41,6 +45,7 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
     let points = plan.records as f64;
     let raster = planned_raster(plan);
     let raster = raster.map_or(0.0, |grid| grid.cells() as f64 * RASTER + grid.stored_cells() as f64 * RASTER_STORED);
+    let map_tiles = planned_map_tiles(plan).map_or(0.0, |(_, pixels)| pixels as f64 * MAP_TILES);
     let exports = match plan.options.output.export.formats().count() {
         0 => 0.0,
         formats => NUMBER + formats as f64 * EXPORT,
@@ -55,6 +60,7 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
         ("mesh", points * MESH),
         ("levels", points * LEVELS),
         ("raster", raster),
+        ("map tiles", map_tiles),
         ("export", points * exports),
         ("contours", points * contours),
         ("terrain", points * terrain),

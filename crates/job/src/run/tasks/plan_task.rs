@@ -14,6 +14,7 @@ use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
 use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::check_height_offset;
+use crate::publish::map_tiles::check::check_map_tiles;
 use crate::publish::raster::check::check_raster;
 use crate::publish::terrain_tiles::check::check_terrain;
 use crate::run::attempt::read_earlier;
@@ -59,6 +60,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
     check_raster(&plan)?;
+    check_map_tiles(&plan)?;
     check_contours(&plan)?;
     check_terrain(&plan)?;
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
