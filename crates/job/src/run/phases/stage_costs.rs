@@ -26,7 +26,7 @@ const CONTOURS: f64 = 250.0;
 fn cost_of_reading(format: FileFormat) -> f64 {
     match format {
         FileFormat::Las => 130.0,
-        FileFormat::Laz => 370.0,
+        FileFormat::Laz | FileFormat::Ept => 370.0,
         FileFormat::Text => 250.0,
     }
 }
