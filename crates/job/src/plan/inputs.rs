@@ -9,6 +9,7 @@ use points::options::{InputOptions, OnBadFile};
 use points::{FileFormat, RowChoice, Source, is_url, listed_clouds, open_chosen, remote_files};
 use rayon::prelude::*;
 use std::collections::HashSet;
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use sys::{Error, Result};
 
@@ -52,7 +53,7 @@ pub fn named_inputs(options: &InputOptions) -> Result<NamedInputs> {
     for found in found {
         let paths = match found {
             Named::Cloud(path) => vec![path],
-            Named::List(number) => named.wanted_of(&mut lists[number], &areas),
+            Named::List(number) => named.wanted_of(&mut lists[number], &areas)?,
         };
         // Paths with a double slash are one path, and URLs are two.
         named.paths.extend(paths.into_iter().filter(|path| known.insert(place(path).into_os_string())));
@@ -75,7 +76,10 @@ enum Named {
 
 impl NamedInputs {
     /// Returns the clouds of a list that are opened, and notes how many are not.
-    fn wanted_of(&mut self, list: &mut ListedInputs, areas: &ListedAreas) -> Vec<PathBuf> {
+    ///
+    /// # Errors
+    /// [`Error::Input`] if one of this machine is not there.
+    fn wanted_of(&mut self, list: &mut ListedInputs, areas: &ListedAreas) -> Result<Vec<PathBuf>> {
         let all = list.clouds.len();
         let (wanted, outside) = areas.wanted(std::mem::take(&mut list.clouds));
         if outside > 0 {
@@ -84,7 +88,18 @@ impl NamedInputs {
                 list.list.display()
             ));
         }
-        wanted
+        let is_gone = |path: &&PathBuf| {
+            let is_local = !path.to_str().is_some_and(is_url);
+            is_local && path.metadata().is_err_and(|error| error.kind() == ErrorKind::NotFound)
+        };
+        match wanted.iter().find(is_gone) {
+            Some(gone) => {
+                let what =
+                    format!("names {}, and there is no such file: correct the list, or copy the file", gone.display());
+                Err(Error::input(&list.list, what))
+            }
+            None => Ok(wanted),
+        }
     }
 }
 
