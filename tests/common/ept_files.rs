@@ -108,13 +108,20 @@ fn index(cloud: &CopcFile, kind: NodeType) -> Value {
     let axis = |name: &str, axis: usize| json!({"name": name, "type": "signed", "size": 4, "scale": 0.01, "offset": OFFSETS[axis]});
     let unsigned = |name: &str, size: usize| json!({"name": name, "type": "unsigned", "size": size});
     let half = f64::from(cloud.half) / 100.0;
-    let [min, max] = bounds(cloud);
+    let cube = [OFFSETS.map(|middle| middle - half), OFFSETS.map(|middle| middle + half)].concat();
+    let conforming = bounds(cloud).concat();
+    let data_type = match kind {
+        NodeType::Laszip => "laszip",
+        NodeType::Binary => "binary",
+        NodeType::Zstandard => "zstandard",
+    };
+    let points: usize = cloud.nodes.values().map(Vec::len).sum();
     json!({
-        "bounds": [OFFSETS.map(|middle| middle - half), OFFSETS.map(|middle| middle + half)].concat(),
-        "boundsConforming": [min, max].concat(),
-        "dataType": match kind { NodeType::Laszip => "laszip", NodeType::Binary => "binary", NodeType::Zstandard => "zstandard" },
+        "bounds": cube,
+        "boundsConforming": conforming,
+        "dataType": data_type,
         "hierarchyType": "json",
-        "points": cloud.nodes.values().map(Vec::len).sum::<usize>(),
+        "points": points,
         "schema": [
             axis("X", 0), axis("Y", 1), axis("Z", 2), unsigned("Intensity", 2), unsigned("ReturnNumber", 1),
             unsigned("NumberOfReturns", 1), unsigned("ClassFlags", 1), unsigned("Classification", 1),

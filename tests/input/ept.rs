@@ -30,7 +30,8 @@ fn within(source: &Source, bounds: [f64; 4]) -> PointRules {
 #[test]
 fn the_points_are_those_of_one_file() {
     let cloud = made();
-    let laz = open(&file(".laz", &one_file(&cloud)), &TextOptions::default()).unwrap();
+    let path = file(".laz", &one_file(&cloud));
+    let laz = open(&path, &TextOptions::default()).unwrap();
     let lattice = lattice(&laz);
     let (expected, counts) = decode(&laz, &rules(&laz, &lattice)).unwrap();
     for kind in NodeType::ALL {

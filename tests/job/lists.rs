@@ -91,8 +91,8 @@ fn an_interrupted_job_notices_a_list_that_has_changed() {
     let text = folder.path().join("tiles.txt");
     let interrupted = || {
         fs::write(&text, "clouds/a.csv\nclouds/b.csv\n").unwrap();
-        let mut job = Job::on(&[&text]).variable("GDT_FAULT", "committed:3");
-        job.run();
+        let mut job = Job::on(&[&text]).tiles_of(500).variable("GDT_FAULT", "signal-merge:1");
+        assert_eq!(job.run().code, 1);
         job.calm();
         job
     };

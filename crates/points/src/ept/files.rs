@@ -56,7 +56,7 @@ impl SideFile {
         Ok(SideFile { path: name_beside(index, name), url, about })
     }
 
-    /// Says that the file will be read once, not to be kept.
+    /// Says that the file will be read once more, and not again.
     pub(crate) fn expect(&self) {
         self.request().iter().for_each(WholeRequest::expect);
     }
@@ -66,13 +66,14 @@ impl SideFile {
         self.request().iter().for_each(WholeRequest::prepare);
     }
 
-    /// Returns its bytes; `None` if it is not there. With `keep` they stay in memory for the next time, if they are from another machine.
+    /// Returns its bytes; `None` if it is not there. Those from another machine stay in memory until they are read for the last time, if
+    /// there is room.
     ///
     /// # Errors
     /// [`Error::Input`] if it is too large, [`Error::Io`] if it cannot be read.
-    pub(crate) fn bytes(&self, keep: bool) -> Result<Option<Bytes>> {
+    pub(crate) fn bytes(&self) -> Result<Option<Bytes>> {
         if let Some(request) = self.request() {
-            return Ok(request.fetch(keep)?.map(Bytes::Remote));
+            return Ok(request.fetch(true)?.map(Bytes::Remote));
         }
         let refused = Error::io("read", &self.path);
         let file = match fault::read("read-input").and_then(|()| File::open(&self.path)) {
@@ -88,13 +89,13 @@ impl SideFile {
         }
     }
 
-    /// Opens it; `None` if it is not there.
+    /// Opens it; `None` if it is not there. As [`SideFile::bytes`] otherwise.
     ///
     /// # Errors
     /// As [`SideFile::bytes`].
-    pub(crate) fn open(&self, keep: bool) -> Result<Option<RandomAccessFile>> {
+    pub(crate) fn open(&self) -> Result<Option<RandomAccessFile>> {
         if let Some(request) = self.request() {
-            return Ok(request.fetch(keep)?.map(|file| RandomAccessFile::of_whole(self.path.clone(), file)));
+            return Ok(request.fetch(true)?.map(|file| RandomAccessFile::of_whole(self.path.clone(), file)));
         }
         match RandomAccessFile::open(&self.path) {
             Err(Error::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
@@ -118,5 +119,7 @@ pub(crate) fn page(index: &Path, root: NodeKey) -> Result<Bytes> {
         let what = format!("the page {} of its hierarchy is not there: copy the data set again", file.path.display());
         Error::input(index, what)
     };
-    file.bytes(false)?.ok_or_else(missing)
+    // Nobody keeps pages: they are read anew for each plan.
+    file.expect();
+    file.bytes()?.ok_or_else(missing)
 }

@@ -223,12 +223,10 @@ impl PointFormat for EptPoints {
                 cell: self.cell(node, request.bounds).filter(|_| !request.left_out),
                 request: ChunkRequest { records, bounds: None, left_out: false, ..request },
             };
-            // What a sample looks at is read once more.
-            let keeps = request.records != u64::MAX;
             match &self.data {
-                NodeData::Laszip => wanted.decode_laszip(&self.axes, keeps, sink)?,
-                NodeData::Binary(layout) => wanted.decode_records(layout, false, keeps, sink)?,
-                NodeData::Zstandard(layout) => wanted.decode_records(layout, true, keeps, sink)?,
+                NodeData::Laszip => wanted.decode_laszip(&self.axes, sink)?,
+                NodeData::Binary(layout) => wanted.decode_records(layout, false, sink)?,
+                NodeData::Zstandard(layout) => wanted.decode_records(layout, true, sink)?,
             }
         }
         if left > 0 && !request.left_out && chunk + 1 == self.chunk_count() {
@@ -263,8 +261,8 @@ impl NodeRequest<'_> {
     }
 
     /// Decodes a node that is a LAZ file.
-    fn decode_laszip(&self, axes: &[Axis; 3], keeps: bool, sink: &mut impl RecordSink) -> Result<()> {
-        let Some(file) = self.file.open(keeps)? else {
+    fn decode_laszip(&self, axes: &[Axis; 3], sink: &mut impl RecordSink) -> Result<()> {
+        let Some(file) = self.file.open()? else {
             self.is_missing(sink);
             return Ok(());
         };
@@ -293,14 +291,8 @@ impl NodeRequest<'_> {
     }
 
     /// Decodes a node of records, compressed together or not.
-    fn decode_records(
-        &self,
-        layout: &BinaryLayout,
-        is_compressed: bool,
-        keeps: bool,
-        sink: &mut impl RecordSink,
-    ) -> Result<()> {
-        let Some(bytes) = self.file.bytes(keeps)? else {
+    fn decode_records(&self, layout: &BinaryLayout, is_compressed: bool, sink: &mut impl RecordSink) -> Result<()> {
+        let Some(bytes) = self.file.bytes()? else {
             self.is_missing(sink);
             return Ok(());
         };

@@ -59,7 +59,7 @@ pub(crate) struct WholeRequest<'a> {
 }
 
 impl WholeRequest<'_> {
-    /// Says that the file will be fetched once, not to be kept.
+    /// Says that the file will be fetched once more, and not again.
     pub(crate) fn expect(&self) {
         state().expected.insert(self.hash());
     }
@@ -73,7 +73,8 @@ impl WholeRequest<'_> {
         }
     }
 
-    /// Returns the file; `None` if there is none. With `keep` it stays in memory for those who ask again, if there is room.
+    /// Returns the file; `None` if there is none. With `keep` it stays in memory for those who ask again, if there is room and it is not
+    /// expected: then this is the last time.
     ///
     /// # Errors
     /// [`Error::Input`] if it has more bytes than it may have, [`Error::Io`] if it is not handed out, [`Error::Interrupted`].
@@ -95,13 +96,11 @@ impl WholeRequest<'_> {
     fn pending(&self, keep: bool) -> Pending {
         let mut state = state();
         let known = state.kept.remove(self.url);
-        let keeps = keep && (known.is_some() || may_keep(self.about));
+        let is_last_time = state.expected.remove(&self.hash());
+        let keeps = keep && !is_last_time && (known.is_some() || may_keep(self.about));
         let pending = known.unwrap_or_else(|| self.begin());
         if keeps {
             state.kept.insert(self.url.into(), pending.clone());
-        }
-        if !keep {
-            state.expected.remove(&self.hash());
         }
         pending
     }
