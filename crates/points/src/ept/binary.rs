@@ -5,7 +5,7 @@ use std::io::Read;
 use ruzstd::decoding::StreamingDecoder;
 use serde::{Deserialize, Serialize};
 
-use crate::ept::index::Dimension;
+use crate::ept::dimension::Dimension;
 use crate::points::optional_fields::OptionalFields;
 use crate::points::record::PointRecord;
 use crate::points::returns::PulseReturn;

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::ept::binary::BinaryLayout;
+use crate::ept::dimension::Dimension;
 use crate::las::header::axis_of;
 use crate::points::axis::{AXIS_NAMES, Axis};
 use crs::from_records::from_records;
@@ -30,21 +31,6 @@ struct IndexFile {
     schema: Vec<Dimension>,
     #[serde(default)]
     srs: Option<SystemOfIndex>,
-}
-
-/// A value that every point has.
-#[derive(Clone, Deserialize)]
-pub(crate) struct Dimension {
-    pub(crate) name: String,
-    /// `signed`, `unsigned` or `floating`.
-    #[serde(rename = "type")]
-    pub(crate) kind: String,
-    /// Its bytes.
-    pub(crate) size: usize,
-    #[serde(default)]
-    scale: Option<f64>,
-    #[serde(default)]
-    offset: Option<f64>,
 }
 
 /// The coordinate reference system. A data set without one has an empty object.

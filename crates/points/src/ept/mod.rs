@@ -5,6 +5,7 @@
 //! index, so that each is read whole: of another machine in one request.
 
 pub(crate) mod binary;
+pub(crate) mod dimension;
 pub(crate) mod files;
 pub(crate) mod hierarchy;
 pub(crate) mod index;
