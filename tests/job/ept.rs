@@ -119,7 +119,8 @@ mod by_url {
         assert_eq!(number(&check["records"]), 9_000);
         // What may pass is asked for again, and what is not there is named.
         server.answer(|number, _| if number % 3 == 1 { Answer::CutOff(100) } else { Answer::Right });
-        assert_eq!(results(&Job::on(&[&url]).tiles_of(2000).report()), results(&expected));
+        let patient = Job::on(&[&url]).tiles_of(2000).variable("GDT_TIMEOUT_MS", "2000");
+        assert_eq!(results(&patient.report()), results(&expected));
         server.answer(|_, request| match request.target.contains("1-0-0-0.laz") {
             true => Answer::Status(404, "X: y"),
             false => Answer::Right,
