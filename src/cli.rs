@@ -231,7 +231,7 @@ pub enum CliCommand {
     },
     /// Show what point clouds contain.
     Info {
-        /// Point clouds: LAS, LAZ, COPC or text.
+        /// Point clouds: LAS, LAZ, COPC, EPT or text, or lists of them.
         #[arg(required = true)]
         files: Vec<PathBuf>,
         /// Read all points too, and count those of each class and of each return.

@@ -455,16 +455,22 @@ fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the files that a command line names: those of this machine, which must be there, and those that its URLs mean.
+/// Returns the files that a command line names: those of this machine, which must be there, those that its URLs mean, and those that a list
+/// names.
 fn named(files: &[PathBuf]) -> sys::Result<Vec<PathBuf>> {
-    let of_one = |file: &PathBuf| match file.to_str() {
+    let files_of = |file: &PathBuf| match file.to_str() {
         Some(url) if points::is_url(url) => points::remote_files(url),
         _ if file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound) => {
             Err(sys::Error::Config(format!("there is no file {}: correct its name", file.display())))
         }
         _ => Ok(vec![file.clone()]),
     };
-    Ok(files.iter().map(of_one).collect::<sys::Result<Vec<_>>>()?.concat())
+    let of_list = |file: PathBuf| match points::listed_clouds(&file)? {
+        Some(clouds) => Ok(clouds.into_iter().map(|cloud| cloud.path).collect()),
+        None => Ok(vec![file]),
+    };
+    let files = files.iter().map(files_of).collect::<sys::Result<Vec<_>>>()?.concat();
+    Ok(files.into_iter().map(of_list).collect::<sys::Result<Vec<Vec<PathBuf>>>>()?.concat())
 }
 
 /// Prints a result for people or as JSON.

@@ -15,7 +15,7 @@ const COPC: &str = ".copc";
 pub(crate) fn output_name(clouds: &[PathBuf]) -> String {
     let name = match clouds {
         [one] if one.is_dir() => name_of(&one.canonicalize().unwrap_or_else(|_| one.clone())),
-        [one] if folder_of_pattern(one).is_none() => stem(one),
+        [one] if folder_of_pattern(one).is_none() => of_ept(one).or_else(|| stem(one)),
         many => common_folder(many).and_then(|folder| name_of(&folder)),
     };
     match name.map(|name| plain(&name)).filter(|name| !name.is_empty()) {
@@ -38,6 +38,13 @@ fn folder_of_pattern(cloud: &Path) -> Option<PathBuf> {
     let before = &text[..text.find(PATTERN_SIGNS)?];
     let end = before.rfind(std::path::is_separator).unwrap_or(0);
     (!cloud.exists()).then(|| PathBuf::from(&before[..end]))
+}
+
+/// Returns the name of the folder of an EPT; `None` for any other file.
+fn of_ept(cloud: &Path) -> Option<String> {
+    let text = cloud.to_string_lossy();
+    let path = if points::is_url(&text) { text.split('?').next().unwrap_or_default() } else { &text };
+    points::is_ept(cloud).then(|| Path::new(path).parent().and_then(name_of)).flatten()
 }
 
 /// Returns the name of a file without its ending.
@@ -73,6 +80,9 @@ mod tests {
             (&["tiles/a.laz", "tiles/b*.laz"], "tiles-terrain"),
             (&["https://host/dir/a.copc.laz?X-Amz-Signature=SECRET"], "a-terrain"),
             (&["s3://bucket/clouds/*.laz"], "clouds-terrain"),
+            (&["https://host/valley/ept.json?key=a"], "valley-terrain"),
+            (&["ept.json"], "ept-terrain"),
+            (&["lists/north.vpc"], "north-terrain"),
             (&["/"], "terrain"),
         ] {
             let clouds: Vec<PathBuf> = clouds.iter().map(PathBuf::from).collect();

@@ -81,6 +81,7 @@ fn format(source: &Source) -> String {
         FileFormat::Las => "LAS",
         FileFormat::Laz => "LAZ",
         FileFormat::Text => "text",
+        FileFormat::Ept => "EPT",
     };
     source.version.map_or(name.into(), |[major, minor]| format!("{name} {major}.{minor}"))
 }

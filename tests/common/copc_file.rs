@@ -28,9 +28,9 @@ const SECOND_PAGE: i32 = 2;
 
 /// The points of a cloud by the nodes of their octree.
 pub(crate) struct CopcFile {
-    file: LasFile,
+    pub(crate) file: LasFile,
     /// Half the side of the cube in raw steps, around 0, 0, 0.
-    half: i32,
+    pub(crate) half: i32,
     pub(crate) nodes: BTreeMap<Key, Vec<Vec<u8>>>,
 }
 

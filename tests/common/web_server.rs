@@ -159,6 +159,10 @@ fn made(shared: &Shared, request: &Request, answer: Answer) -> (String, Vec<u8>)
         (Answer::Text(text), _) => (head("200 OK", "", text.as_bytes()), text.into_bytes()),
         (_, None) => (head("404 Not Found", "", &[]), Vec::new()),
         (Answer::Whole, Some(file)) => (head("200 OK", "", file), file.clone()),
+        // Small files are asked for whole.
+        (_, Some(file)) if !request.headers.contains_key("range") => {
+            (head("200 OK", "ETag: \"first\"\r\n", file), file.clone())
+        }
         (answer, Some(file)) => {
             let Range { start: first, end } = request.range();
             if first >= file.len() {

@@ -7,11 +7,14 @@ mod cloud;
 mod common;
 #[path = "../common/copc_file.rs"]
 mod copc_file;
+#[path = "../common/ept_files.rs"]
+mod ept_files;
 #[path = "../common/las_file.rs"]
 mod las_file;
 
 mod copc;
 mod damaged;
+mod ept;
 mod formats;
 mod headers;
 mod layouts;

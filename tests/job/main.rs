@@ -4,6 +4,8 @@
 mod common;
 #[path = "../common/copc_file.rs"]
 mod copc_file;
+#[path = "../common/ept_files.rs"]
+mod ept_files;
 #[path = "../common/las_file.rs"]
 mod las_file;
 #[path = "../common/random.rs"]
@@ -42,6 +44,7 @@ mod decimals;
 mod diff;
 mod doubtful_systems;
 mod doubtful_transforms;
+mod ept;
 mod exports;
 mod far_points;
 mod globe;
@@ -54,6 +57,7 @@ mod init;
 mod khronos;
 mod levels;
 mod limits;
+mod lists;
 mod manual;
 mod many_tiles;
 mod map_tiles;

@@ -110,6 +110,7 @@ impl SourceDescription {
             FileFormat::Las => "LAS",
             FileFormat::Laz => "LAZ",
             FileFormat::Text => "text",
+            FileFormat::Ept => "EPT",
         };
         match (&self.version, self.point_format) {
             (Some(version), Some(format)) => format!("{name} {version}, point format {format}"),

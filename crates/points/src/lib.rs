@@ -9,11 +9,13 @@
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 mod decoded_chunks;
+mod ept;
 mod file;
 pub mod histogram;
 pub mod info;
 mod las;
 pub mod lines;
+mod lists;
 mod measured;
 mod middle_zone;
 pub mod options;
@@ -35,8 +37,11 @@ pub mod transformation;
 mod windows_1252;
 
 pub use decoded_chunks::DecodedChunks;
+pub use ept::name::is_ept;
 pub use file::random_access::not_a_file;
 pub use las::classified::{ClassifiedRecord, write_classified};
+pub use lists::listed_cloud::{ListedBox, ListedCloud};
+pub use lists::listed_clouds;
 pub use measured::{MeasuredPoints, PlausiblePoints};
 pub use points::axis::Axis;
 pub use points::counts::PointCounts;

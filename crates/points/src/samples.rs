@@ -4,8 +4,11 @@ use std::fs::File;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::{Xxh3, xxh3_128};
+use xxhash_rust::xxh3::{Xxh3, xxh3_64, xxh3_128};
 
+use crate::ept::files::page;
+use crate::ept::key::NodeKey;
+use crate::ept::name::is_ept;
 use crate::remote::identity;
 use crate::remote::name::is_remote;
 use sys::positional_io::read_exact_at;
@@ -33,6 +36,22 @@ impl FileSamples {
     /// # Errors
     /// [`Error::Io`] if it cannot be read.
     pub fn of(path: &Path) -> Result<FileSamples> {
+        if is_ept(path) {
+            return FileSamples::of_ept(path);
+        }
+        FileSamples::of_one(path)
+    }
+
+    /// As [`FileSamples::of`], of an EPT: its index, and the first page of its hierarchy, which has the number of points of many nodes.
+    fn of_ept(path: &Path) -> Result<FileSamples> {
+        let index = FileSamples::of_one(path)?;
+        let page = page(path, NodeKey::default())?;
+        let page = page.as_ref();
+        let parts = [index.samples, xxh3_64(page)].map(u64::to_le_bytes).concat();
+        Ok(FileSamples { bytes: index.bytes + page.len() as u64, samples: xxh3_64(&parts) })
+    }
+
+    fn of_one(path: &Path) -> Result<FileSamples> {
         if is_remote(path) {
             return identity(path).map(|(bytes, samples)| FileSamples { bytes, samples });
         }

@@ -7,6 +7,8 @@ use rust_decimal::Decimal;
 use serde::{Deserialize, Serialize};
 
 use crate::decoded_chunks::DecodedChunks;
+use crate::ept::name::is_ept;
+use crate::ept::points::EptPoints;
 use crate::file::random_access::RandomAccessFile;
 use crate::las::crs_records;
 use crate::las::header::LasHeader;
@@ -40,6 +42,7 @@ use crs::unit::Unit;
 use sys::{Error, Result, Warnings};
 
 mod crs_origin;
+mod ept;
 mod geocentric;
 mod likely;
 mod nodata;
@@ -55,6 +58,8 @@ pub enum FileFormat {
     Laz,
     /// A table of numbers as text.
     Text,
+    /// An octree of many files (Entwine Point Tiles).
+    Ept,
 }
 
 /// A point cloud file that has been opened. What it says about its points is a claim of the file; only [`Source::decode`] tells
@@ -130,6 +135,7 @@ enum PointData {
     Las(UncompressedPoints),
     Laz(CompressedPoints),
     Text(Box<TextTable>),
+    Ept(Box<EptPoints>),
 }
 
 /// Asks the format of a [`PointData`].
@@ -139,6 +145,7 @@ macro_rules! ask {
             PointData::Las($points) => $answer,
             PointData::Laz($points) => $answer,
             PointData::Text($points) => $answer,
+            PointData::Ept($points) => $answer,
         }
     };
 }
@@ -187,6 +194,11 @@ pub fn open(path: &Path, text: &TextOptions) -> Result<Source> {
 /// As [`open()`].
 pub fn open_chosen(path: &Path, text: &TextOptions, choice: &RowChoice) -> Result<Source> {
     let file = RandomAccessFile::open(path)?;
+    if is_ept(path) {
+        let mut source = Source::open_ept(&file, choice)?;
+        source.warnings.extend(file.doubt().map(str::to_string));
+        return Ok(source);
+    }
     let mut start = [0; 256];
     let held = file.size().min(start.len() as u64) as usize;
     file.read_exact_at(&mut start[..held], 0)?;
@@ -567,6 +579,14 @@ impl Source {
     /// Returns the bounds for an index of the file: none if they are in another system than the file.
     pub(crate) fn own_bounds<'a>(&self, bounds: Option<&'a RawBounds>) -> Option<&'a RawBounds> {
         bounds.filter(|_| self.transform.as_ref().is_none_or(|transform| !transform.is_moved))
+    }
+
+    /// Returns the points of an EPT; `None` for a source in one file.
+    pub(crate) fn ept(&self) -> Option<&EptPoints> {
+        match &self.points {
+            PointData::Ept(points) => Some(points),
+            _ => None,
+        }
     }
 
     /// Returns the bytes of a chunk that are best read at once for this request, in their order.

@@ -58,7 +58,7 @@ fn leave_out_outliers(
     for (index, source) in sources.iter_mut().enumerate() {
         all.add(match source.format {
             FileFormat::Text => source.leave_out_outliers(&choice)?,
-            FileFormat::Las | FileFormat::Laz => {
+            FileFormat::Las | FileFormat::Laz | FileFormat::Ept => {
                 look_at(source, &options.input, claims.map(|extent| &extent.boxes[index]))?
             }
         });

@@ -1,7 +1,7 @@
 //! What is in a folder that stands for its point clouds.
 
 use crate::plan::named_files::current_if_empty;
-use points::TextOptions;
+use points::{TextOptions, is_ept};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use sys::{Error, Result};
@@ -53,14 +53,17 @@ impl FolderFiles {
         Ok(found)
     }
 
-    /// Returns the clouds that the folder stands for: LAS and LAZ, or, if it has none, the texts that are point clouds as `text` lays
-    /// them out. Folders in it are not searched.
+    /// Returns the clouds that the folder stands for: LAS and LAZ, or, if it has none, the index of an EPT, or the texts that are point clouds
+    /// as `text` lays them out. Folders in it are not searched.
     ///
     /// # Errors
     /// [`Error::Config`] if there is none, [`Error::Io`] if a text cannot be read: it may be a point cloud.
     pub fn clouds(&self, text: &TextOptions) -> Result<FolderClouds> {
         let (laser, texts) = (self.with_endings(&LASER), self.with_endings(&TEXT));
         let mut notes = Vec::new();
+        if let Some(index) = self.files.iter().find(|path| is_ept(path)).filter(|_| laser.is_empty()) {
+            return Ok(FolderClouds { clouds: vec![index.clone()], notes });
+        }
         if let Some(first) = texts.first().filter(|_| !laser.is_empty()) {
             let (texts, them) = some(texts.len(), first);
             notes.push(format!("{texts} left out beside LAS and LAZ: name {them} to read {them} too"));

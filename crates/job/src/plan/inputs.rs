@@ -3,11 +3,13 @@
 use crate::plan::folder_files::{FolderClouds, FolderFiles};
 use crate::plan::input_identity::place;
 use crate::plan::job_plan::SkippedInput;
+use crate::plan::listed_inputs::{ListedAreas, ListedInputs};
 use crate::plan::named_files::files_or_folders_of;
 use points::options::{InputOptions, OnBadFile};
-use points::{FileFormat, RowChoice, Source, is_url, open_chosen, remote_files};
+use points::{FileFormat, RowChoice, Source, is_url, listed_clouds, open_chosen, remote_files};
 use rayon::prelude::*;
 use std::collections::HashSet;
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use sys::{Error, Result};
 
@@ -19,26 +21,86 @@ const FILES: &str = "[input] files";
 pub struct NamedInputs {
     /// In their order, each once: two paths that lead to the same file count as one.
     pub paths: Vec<PathBuf>,
-    /// What the user should know about files of folders that were left out.
+    /// What the user should know about files of folders and of lists that were left out.
     pub notes: Vec<String>,
 }
 
-/// Returns the files that the options name. An entry that is a folder stands for the point clouds in it.
+/// Returns the files that the options name. An entry that is a folder stands for the point clouds in it, and one that is a list for those that
+/// it names, without those that lie elsewhere by the list.
 ///
 /// # Errors
-/// [`Error::Config`] if an entry names none, [`Error::Io`] if a folder cannot be read.
+/// [`Error::Config`] if an entry names none, [`Error::Input`] if a list is bad, [`Error::Io`] if a folder or a list cannot be read.
 pub fn named_inputs(options: &InputOptions) -> Result<NamedInputs> {
-    let (mut named, mut known) = (NamedInputs::default(), HashSet::new());
+    let (mut found, mut notes, mut lists) = (Vec::new(), Vec::new(), Vec::new());
     for entry in &options.files {
-        let FolderClouds { clouds, notes } = files_of_entry(entry, options)?;
-        if clouds.is_empty() {
+        let entry_has = files_of_entry(entry, options)?;
+        if entry_has.clouds.is_empty() {
             return Err(Error::Config(format!("{FILES}: there is no file {entry}{}", hint_of_escape(entry))));
         }
-        // Paths with a double slash are one path, and URLs are two.
-        named.paths.extend(clouds.into_iter().filter(|path| known.insert(place(path).into_os_string())));
-        named.notes.extend(notes);
+        notes.extend(entry_has.notes);
+        for path in entry_has.clouds {
+            match listed_clouds(&path).map_err(of_option)? {
+                None => found.push(Named::Cloud(path)),
+                Some(clouds) => {
+                    found.push(Named::List(lists.len()));
+                    lists.push(ListedInputs { list: path, clouds });
+                }
+            }
+        }
     }
-    Ok(named)
+    let (areas, mut known) = (ListedAreas::of(options, &lists), HashSet::new());
+    let mut named = NamedInputs { paths: Vec::new(), notes };
+    for found in found {
+        let paths = match found {
+            Named::Cloud(path) => vec![path],
+            Named::List(number) => named.wanted_of(&mut lists[number], &areas)?,
+        };
+        // Paths with a double slash are one path, and URLs are two.
+        named.paths.extend(paths.into_iter().filter(|path| known.insert(place(path).into_os_string())));
+    }
+    match (named.paths.is_empty(), lists.first()) {
+        (true, Some(list)) => Err(Error::Config(format!(
+            "{FILES}: by {}, no point cloud of a list meets [input] bounds or clip: correct these, or the list",
+            list.list.display()
+        ))),
+        _ => Ok(named),
+    }
+}
+
+/// What an entry names.
+enum Named {
+    Cloud(PathBuf),
+    /// The list of this number.
+    List(usize),
+}
+
+impl NamedInputs {
+    /// Returns the clouds of a list that are opened, and notes how many are not.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if one of this machine is not there.
+    fn wanted_of(&mut self, list: &mut ListedInputs, areas: &ListedAreas) -> Result<Vec<PathBuf>> {
+        let all = list.clouds.len();
+        let (wanted, outside) = areas.wanted(std::mem::take(&mut list.clouds));
+        if outside > 0 {
+            self.notes.push(format!(
+                "{}: {outside} of its {all} files were not opened, because by the list they lie outside [input] bounds or clip",
+                list.list.display()
+            ));
+        }
+        let is_gone = |path: &&PathBuf| {
+            let is_local = !path.to_str().is_some_and(is_url);
+            is_local && path.metadata().is_err_and(|error| error.kind() == ErrorKind::NotFound)
+        };
+        match wanted.iter().find(is_gone) {
+            Some(gone) => {
+                let what =
+                    format!("names {}, and there is no such file: correct the list, or copy the file", gone.display());
+                Err(Error::input(&list.list, what))
+            }
+            None => Ok(wanted),
+        }
+    }
 }
 
 /// Returns the paths of [`named_inputs`].

@@ -23,6 +23,7 @@ pub mod input_identity;
 pub mod inputs;
 pub mod job_plan;
 pub mod lattice_choice;
+pub(crate) mod listed_inputs;
 pub mod make_plan;
 pub(crate) mod measured_inputs;
 mod missing_attributes;

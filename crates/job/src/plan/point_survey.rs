@@ -267,7 +267,7 @@ impl<'a> PointSurvey<'a> {
 fn steps_of(source: &Source, axis: usize) -> i64 {
     let farthest = match source.format {
         FileFormat::Text => source.min[axis].abs().max(source.max[axis].abs()),
-        FileFormat::Las | FileFormat::Laz => 0.0,
+        FileFormat::Las | FileFormat::Laz | FileFormat::Ept => 0.0,
     };
     let scale = to_float(source.axes[axis].scale);
     let mut steps = MEASURE;

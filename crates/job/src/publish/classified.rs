@@ -79,8 +79,13 @@ fn names(plan: &Plan) -> Vec<String> {
 
 fn write_one(input: &PlannedInput, ground: &Ground, path: &Path) -> Result<PendingFile> {
     let PlannedInput { source, .. } = input;
-    if source.format == FileFormat::Text {
-        return Err(Error::input(&source.path, "a text file has no classes; only LAS and LAZ files are copied"));
+    let not_copied = match source.format {
+        FileFormat::Las | FileFormat::Laz => None,
+        FileFormat::Text => Some("a text file has no classes; only LAS and LAZ files are copied"),
+        FileFormat::Ept => Some("an EPT has many files; only LAS and LAZ files are copied"),
+    };
+    if let Some(what) = not_copied {
+        return Err(Error::input(&source.path, what));
     }
     let judged = judged_records(input, ground)?;
     let partial: PathBuf = partial_path(path);

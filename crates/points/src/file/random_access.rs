@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::file::range::{FileRange, READ_AHEAD, RangeSource, SHRUNK};
 use crate::remote::name::is_remote;
-use crate::remote::{HeldFile, to_hold};
+use crate::remote::{HeldFile, WholeFile, to_hold};
 use sys::positional_io::read_exact_at;
 use sys::{Error, Result, fault};
 
@@ -22,9 +22,16 @@ pub(crate) struct RandomAccessFile {
 enum Content {
     Local(File),
     Remote(HeldFile),
+    /// All of them are in memory.
+    Whole(WholeFile),
 }
 
 impl RandomAccessFile {
+    /// Returns a file of another machine that has been fetched whole. `path` is what messages call it.
+    pub(crate) fn of_whole(path: PathBuf, file: WholeFile) -> RandomAccessFile {
+        RandomAccessFile { size: file.bytes().len() as u64, content: Content::Whole(file), path }
+    }
+
     /// Opens `path`, which must be a regular file, or a file of another machine.
     pub(crate) fn open(path: &Path) -> Result<RandomAccessFile> {
         if is_remote(path) {
@@ -75,7 +82,7 @@ impl RandomAccessFile {
     /// Returns what the user should know about the file besides what it holds.
     pub(crate) fn doubt(&self) -> Option<&'static str> {
         match &self.content {
-            Content::Local(_) => None,
+            Content::Local(_) | Content::Whole(_) => None,
             Content::Remote(file) => file.doubt(),
         }
     }
@@ -91,7 +98,7 @@ impl RandomAccessFile {
     /// Brings the bytes of these ranges, which are in their order, into memory until the file is closed, if it is of another machine.
     pub(crate) fn hold(&self, ranges: impl Iterator<Item = Range<u64>>) -> Result<()> {
         match &self.content {
-            Content::Local(_) => Ok(()),
+            Content::Local(_) | Content::Whole(_) => Ok(()),
             Content::Remote(file) => file.hold(&to_hold(ranges)),
         }
     }
@@ -101,6 +108,10 @@ impl RandomAccessFile {
         let outcome = fault::read("read-input").and_then(|()| match &self.content {
             Content::Local(file) => read_exact_at(file, buffer, offset),
             Content::Remote(file) => file.read_exact_at(buffer, offset).map_err(io::Error::other),
+            Content::Whole(file) => file.read_at(buffer, offset).and_then(|count| match count == buffer.len() {
+                true => Ok(()),
+                false => Err(io::ErrorKind::UnexpectedEof.into()),
+            }),
         });
         outcome.map_err(|error| match error.kind() {
             io::ErrorKind::UnexpectedEof => Error::io("read", &self.path)(io::Error::other(SHRUNK)),
@@ -126,6 +137,7 @@ impl RandomAccessFile {
         let source = match &self.content {
             Content::Local(file) => RangeSource::Local(file.try_clone().map_err(Error::io("read", &self.path))?),
             Content::Remote(file) => RangeSource::Remote(file.stream(range.clone())),
+            Content::Whole(file) => RangeSource::Whole(file.clone()),
         };
         Ok(FileRange::new(source, range, read_ahead))
     }

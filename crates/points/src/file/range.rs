@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 
-use crate::remote::RemoteStream;
+use crate::remote::{RemoteStream, WholeFile};
 use sys::fault;
 use sys::positional_io::read_at;
 
@@ -18,6 +18,7 @@ pub(crate) const READ_AHEAD: usize = 1 << 16;
 pub(crate) enum RangeSource {
     Local(File),
     Remote(RemoteStream),
+    Whole(WholeFile),
 }
 
 impl RangeSource {
@@ -25,6 +26,7 @@ impl RangeSource {
         match self {
             RangeSource::Local(file) => read_at(file, out, at),
             RangeSource::Remote(stream) => stream.read_at(out, at),
+            RangeSource::Whole(file) => file.read_at(out, at),
         }
     }
 }

@@ -14,6 +14,7 @@ use crate::file::random_access::RandomAccessFile;
 use crate::las::chunk_table::LazChunk;
 use crate::las::header::LasHeader;
 use crate::las::vlr::Vlr;
+use crate::points::octree::{MOST_LEVELS, cell_of};
 use crate::points::raw_bounds::RawBounds;
 use sys::bytes::{float64, int32, uint64};
 use sys::{Error, Result, Warnings};
@@ -31,9 +32,6 @@ const INFO_BYTES: usize = 56;
 /// The bytes of an entry of a page.
 const ENTRY: usize = 32;
 
-/// The deepest level of a node: its place there fits an `i32`.
-const MOST_LEVELS: u32 = 30;
-
 /// The most entries for each chunk: a node without points stands above one with points.
 const MOST_ENTRIES: u64 = 2 * MOST_LEVELS as u64;
 
@@ -42,11 +40,6 @@ const CHECKED_CHUNKS: usize = 1000;
 
 /// As many of a file of another machine, where each takes a request.
 const CHECKED_REMOTE_CHUNKS: usize = 16;
-
-/// Writers compute nodes in floating point, before or after they round coordinates. A node is taken for so many raw steps wider on
-/// every side, and for a small part of its width.
-const SLACK_STEPS: f64 = 2.0;
-const SLACK_SHARE: f64 = 1.0 / 1024.0;
 
 /// Why an octree is not used.
 #[derive(Debug, thiserror::Error)]
@@ -154,14 +147,7 @@ impl CopcIndex {
     /// Returns what the points of a LAZ chunk lie within.
     pub(crate) fn cell(&self, chunk: &LazChunk) -> Option<RawBounds> {
         let &Node(level, x, y) = self.nodes.get(chunk.number)?;
-        let ends = |axis: usize, number: u32| {
-            let width = self.side[axis] / (1u64 << level.min(MOST_LEVELS)) as f64;
-            let slack = SLACK_STEPS + SLACK_SHARE * width;
-            let low = self.min[axis] + number as f64 * width;
-            [(low - slack).floor() as i64, (low + width + slack).ceil() as i64]
-        };
-        let [[x_min, x_max], [y_min, y_max]] = [ends(0, x), ends(1, y)];
-        Some(RawBounds { min: [x_min, y_min], max: [x_max, y_max] })
+        Some(cell_of(self.min, self.side, level.min(MOST_LEVELS), [x, y]))
     }
 
     /// Looks at the first point of chunks at equal distances. A chunk begins with it, and it is not compressed.

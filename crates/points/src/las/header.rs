@@ -162,10 +162,14 @@ fn bounds(bytes: &[u8]) -> std::result::Result<[[f64; 3]; 2], HeaderError> {
 
 fn axis(bytes: &[u8], index: usize) -> std::result::Result<Axis, HeaderError> {
     let (scale, offset) = (float64(bytes, 131 + 8 * index), float64(bytes, 155 + 8 * index));
-    let unusable = |what, value| HeaderError::Axis { value, what, axis: AXIS_NAMES[index] };
-    let step = written_decimal(scale).filter(|step| *step > Decimal::ZERO).ok_or_else(|| unusable("scale", scale))?;
+    axis_of(scale, offset).map_err(|(what, value)| HeaderError::Axis { value, what, axis: AXIS_NAMES[index] })
+}
+
+/// Returns the axis with this scale and offset, or the one that is not usable, and its value.
+pub(crate) fn axis_of(scale: f64, offset: f64) -> std::result::Result<Axis, (&'static str, f64)> {
+    let step = written_decimal(scale).filter(|step| *step > Decimal::ZERO).ok_or(("scale", scale))?;
     let in_steps = |origin: &Decimal| origin.checked_div(step).is_some_and(|steps| steps.abs() < MOST_STEPS);
-    let origin = written_decimal(offset).filter(in_steps).ok_or_else(|| unusable("offset", offset))?;
+    let origin = written_decimal(offset).filter(in_steps).ok_or(("offset", offset))?;
     Ok(Axis { offset: origin, scale: step })
 }
 

@@ -64,6 +64,11 @@ impl CompressedPoints {
         Ok(CompressedPoints { layout, compression, chunks: group(laz_chunks), index, missing })
     }
 
+    /// Returns the number of records of a chunk.
+    pub(crate) fn records_of(&self, chunk: usize) -> u64 {
+        self.chunks.get(chunk).into_iter().flatten().map(|laz_chunk| laz_chunk.count).sum()
+    }
+
     /// Returns the number of records, including the missing ones.
     fn records(&self) -> u64 {
         let last = self.chunks.last().and_then(|chunk| chunk.last());

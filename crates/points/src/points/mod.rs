@@ -11,6 +11,7 @@ pub(crate) mod nodata;
 pub(crate) mod nodata_choice;
 pub(crate) mod nodata_number;
 pub(crate) mod nodata_sink;
+pub(crate) mod octree;
 pub(crate) mod optional_fields;
 pub(crate) mod point;
 pub(crate) mod raw_bounds;

@@ -12,9 +12,14 @@ pub(crate) mod name;
 mod network;
 #[cfg(not(feature = "remote"))]
 mod no_network;
+pub(crate) mod places;
 pub(crate) mod traffic;
 
 #[cfg(feature = "remote")]
-pub(crate) use network::{HeldFile, RemoteStream, files_at, identity, set_space, to_hold};
+pub(crate) use network::{
+    HeldFile, RemoteStream, WholeFile, WholeRequest, files_at, forget_whole_files, identity, set_space, to_hold,
+};
 #[cfg(not(feature = "remote"))]
-pub(crate) use no_network::{HeldFile, RemoteStream, files_at, identity, set_space, to_hold};
+pub(crate) use no_network::{
+    HeldFile, RemoteStream, WholeFile, WholeRequest, files_at, forget_whole_files, identity, set_space, to_hold,
+};

@@ -13,8 +13,11 @@ impl Source {
     /// # Errors
     /// `Io` or `Input` if the file cannot be read any more.
     pub fn crs_is_text(&self) -> Result<bool> {
-        if self.format == FileFormat::Text {
-            return Ok(false);
+        match self.format {
+            FileFormat::Text => return Ok(false),
+            // Its index has a text, if it has anything.
+            FileFormat::Ept => return Ok(true),
+            FileFormat::Las | FileFormat::Laz => {}
         }
         let file = RandomAccessFile::reopen(&self.path, self.size)?;
         let mut known = Warnings::default();

@@ -33,7 +33,7 @@ const TERRAIN: f64 = 1500.0;
 fn cost_of_reading(format: FileFormat) -> f64 {
     match format {
         FileFormat::Las => 130.0,
-        FileFormat::Laz => 370.0,
+        FileFormat::Laz | FileFormat::Ept => 370.0,
         FileFormat::Text => 250.0,
     }
 }

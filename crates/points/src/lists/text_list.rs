@@ -1,0 +1,112 @@
+//! A text with the path or the URL of a point cloud in each line. Empty lines and those that begin with `#` do not count.
+
+use std::path::Path;
+
+use crate::file::random_access::RandomAccessFile;
+use crate::lists::listed_cloud::{ListedCloud, is_cloud, name_in, place_of};
+use sys::{Error, Result};
+
+/// The bytes by which a list is told from a table of points.
+const HEAD: u64 = 1 << 14;
+
+/// The most bytes of a list.
+const MOST: u64 = 1 << 28;
+
+/// The endings of texts that a line may name.
+const TEXTS: [&str; 5] = [".csv", ".xyz", ".asc", ".pts", ".tsv"];
+
+/// Returns the clouds that the text names; `None` if its first lines do not all name one.
+pub(super) fn clouds_of(path: &Path) -> Result<Option<Vec<ListedCloud>>> {
+    let file = RandomAccessFile::open(path)?;
+    let head = file.bytes(0..file.size().min(HEAD))?;
+    let is_whole = head.len() as u64 == file.size();
+    if !is_list(&String::from_utf8_lossy(&head), is_whole) {
+        return Ok(None);
+    }
+    if file.size() > MOST {
+        return Err(Error::input(path, format!("is a list of more than {} MiB: divide it", MOST >> 20)));
+    }
+    let bytes = if is_whole { head } else { file.bytes(0..file.size())? };
+    let text = String::from_utf8(bytes).map_err(|_| Error::input(path, "is a list, but not in UTF-8: save it so"))?;
+    let mut clouds = Vec::new();
+    for (number, line) in entries(&text) {
+        let refused = |what: String| Error::input(path, format!("line {number}: {what}"));
+        if !names_cloud(line) {
+            return Err(refused(format!(
+                "{line:?} names no point cloud (.las, .laz, ept.json, or a text such as .csv), as the lines before do"
+            )));
+        }
+        clouds.push(ListedCloud { path: place_of(path, line).map_err(refused)?, claim: None });
+    }
+    Ok(Some(clouds))
+}
+
+/// Returns whether all lines name a point cloud, and there are some. The last line counts only if the text `is_whole`.
+fn is_list(head: &str, is_whole: bool) -> bool {
+    let end = if is_whole { head.len() } else { head.rfind('\n').unwrap_or(0) };
+    let mut lines = entries(&head[..end]).peekable();
+    lines.peek().is_some() && lines.all(|(_, line)| names_cloud(line))
+}
+
+/// Returns the lines that count, with their numbers from 1 on.
+fn entries(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let lines = text.lines().map(str::trim).enumerate().map(|(index, line)| (index + 1, line));
+    lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+fn names_cloud(line: &str) -> bool {
+    let name = name_in(line);
+    is_cloud(line) || TEXTS.iter().any(|ending| name.len() > ending.len() && name.ends_with(ending))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+
+    fn clouds(text: &[u8]) -> Result<Option<Vec<PathBuf>>> {
+        let folder = tempfile::tempdir().unwrap();
+        let list = folder.path().join("list.txt");
+        std::fs::write(&list, text).unwrap();
+        let short = |cloud: ListedCloud| {
+            cloud.path.strip_prefix(folder.path()).map(Path::to_path_buf).unwrap_or(cloud.path.clone())
+        };
+        Ok(clouds_of(&list)?.map(|clouds| clouds.into_iter().map(short).collect()))
+    }
+
+    #[test]
+    fn lines_name_clouds() {
+        let text = "\u{feff}# tiles\r\na.laz\r\n\n  b c/1.LAS \nhttps://host/d.copc.laz?key=1\n/e/ept.json\nf.xyz";
+        let expected = ["a.laz", "b c/1.LAS", "https://host/d.copc.laz?...", "/e/ept.json", "f.xyz"];
+        assert_eq!(clouds(text.as_bytes()).unwrap().unwrap(), expected.map(PathBuf::from));
+    }
+
+    #[test]
+    fn a_table_of_points_is_no_list() {
+        for text in [
+            "1 2 3\n4 5 6\n",
+            "# a.laz\n1 2 3\n",
+            "x,y,z\n1,2,3\n",
+            "a.laz\n1 2 3\n",
+            "",
+            "# a.laz\n",
+            ".csv\n",
+            "\u{0}a.la\n",
+        ] {
+            assert_eq!(clouds(text.as_bytes()).unwrap(), None, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_line_that_names_no_cloud_far_behind_is_an_error() {
+        let text = "tile.laz\n".repeat(HEAD as usize / 8) + "roads.gpkg\n";
+        let error = clouds(text.as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("line 2049: \"roads.gpkg\" names no point cloud"), "{error}");
+        let error = clouds(&[text.replace("roads.gpkg", "").as_bytes(), b"\xff.laz\n"].concat()).unwrap_err();
+        assert!(error.to_string().contains("not in UTF-8"), "{error}");
+        let error = clouds(b"a.laz\nftp://host/b.laz\n").unwrap_err().to_string();
+        assert!(error.contains("line 2: files are read by https://"), "{error}");
+    }
+}

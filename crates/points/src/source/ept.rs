@@ -1,0 +1,63 @@
+//! Opening an EPT.
+
+use crate::ept::index::EptIndex;
+use crate::ept::points::EptPoints;
+use crate::file::random_access::RandomAccessFile;
+use crate::source::{FileFormat, PointData, Source};
+use crate::text::row_choice::RowChoice;
+use crs::plausible::plausible;
+use sys::{Error, Result, Warnings};
+
+/// The most bytes of an index.
+const LARGEST: u64 = 1 << 24;
+
+impl Source {
+    /// Opens the EPT whose index is `file`. With bounds, only those nodes count that they meet.
+    pub(super) fn open_ept(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
+        if file.size() > LARGEST {
+            return Err(Error::input(file.path(), "is too long for the index of an EPT"));
+        }
+        let mut warnings = Warnings::default();
+        let index = EptIndex::parse(file.path(), &file.bytes(0..file.size())?, &mut warnings)?;
+        let points = EptPoints::read(file.path(), &index, choice.bounds, choice.use_index)?;
+        if points.missing > 0 {
+            let (all, held) = (index.points, index.points - points.missing);
+            warnings.push(format!("the index promises {all} points, but its hierarchy has only {held}"));
+        }
+        let [min, max] = index.bounds;
+        if min.iter().chain(&max).any(|value| !value.is_finite()) {
+            return Err(Error::input(file.path(), "has bounds that are not finite numbers"));
+        }
+        let mut source = Source {
+            path: file.path().to_path_buf(),
+            size: file.size(),
+            format: FileFormat::Ept,
+            version: None,
+            point_format: None,
+            records: index.points,
+            missing: points.missing,
+            min,
+            max,
+            grid: [index.axes[0].scale, index.axes[1].scale],
+            axes: index.axes,
+            has_rgb: index.has_rgb,
+            has_class: true,
+            has_returns: true,
+            has_intensity: true,
+            crs: plausible(index.crs, min, max, &mut warnings),
+            unit_of_false_record: None,
+            by_return: Vec::new(),
+            warnings,
+            transform: None,
+            nodata: Vec::new(),
+            kept_heights: None,
+            measured: None,
+            is_left_aside: false,
+            points: PointData::Ept(Box::new(points)),
+        };
+        source.drop_false_geocentric_crs(choice.is_crs_stated)?;
+        source.keep_heights(choice);
+        source.find_nodata(choice)?;
+        Ok(source)
+    }
+}
