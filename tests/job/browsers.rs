@@ -13,6 +13,7 @@ use crate::globe::{wide, wide_in_many_tiles};
 use crate::levels::hills;
 use crate::program::{Job, number};
 use crate::random::Random;
+use crate::terrain_tiles::hills_in_utm;
 use crate::tileset::{Tile, applied, extent, files_below, keeps_the_rules, tiles, triangles};
 use crate::validator::validate;
 
@@ -204,6 +205,33 @@ fn cesium_styles_by_class_and_intensity() {
             assert!((shown - wanted).abs() <= 2, "{compression}: {shown} for {wanted}");
         }
     }
+}
+
+/// CesiumJS drapes imagery over terrain tiles, finds the heights of the mesh in them, and shows no hole from any side.
+#[test]
+fn cesium_takes_its_ground_from_terrain_tiles() {
+    let Some(chromium) = chromium() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &hills_in_utm(40_000));
+    let job = Job::on(&[&cloud]).tiles_of(3_000).with("input", "crs = \"EPSG:32633\"").with(
+        "output",
+        "format = \"3dtiles\"\nheight_offset = 40.0\nhull = \"whole\"\nterrain = { format = \"quantized-mesh\" }",
+    );
+    job.run();
+    let places = middles(&job, &tiles(&job));
+    // The first is near the middle of the terrain, and far from it the surroundings are seen too.
+    let views: Vec<[f64; 3]> = (0..8)
+        .flat_map(|turn| [[f64::from(45 * turn), -35.0, 600.0], [f64::from(45 * turn), -60.0, 9_000.0]])
+        .collect();
+    let request = asked(&job, &json!({"places": places, "views": views}));
+    let seen = answered(&job, &chromium, "terrain", &request);
+    assert_eq!((&seen["complaints"], &seen["hasNormals"]), (&json!([]), &json!(true)));
+    let off: Vec<f64> = serde_json::from_value(seen["off"].clone()).unwrap();
+    assert!(off.len() == 12 && off.iter().all(|off| off.abs() < 0.05), "{off:?}");
+    let background: Vec<u64> = serde_json::from_value(seen["background"].clone()).unwrap();
+    assert_eq!(background, vec![0; views.len()]);
+    let report = job.report();
+    assert_eq!(seen["zoom"].as_u64().unwrap() + 1, report["terrain"]["zooms"].as_array().unwrap().len() as u64);
 }
 
 #[track_caller]

@@ -20,6 +20,7 @@ mod web_server;
 
 mod clouds;
 mod program;
+mod terrain_tiles;
 mod tileset;
 mod transformed;
 

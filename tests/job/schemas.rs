@@ -113,6 +113,7 @@ fn add_jobs_of_one_part(documents: &Documents) {
     let bare = Job::on(&[&square]).with("input", "surface = \"bare-earth\"\nbare_earth = { slope = 0.2 }");
     documents.run(&bare);
     let on_map = Job::on(&[&square]).with("input", "crs = \"EPSG:32631\"");
+    let on_map = on_map.with("output", "terrain = { format = \"quantized-mesh\" }");
     documents.run(&on_map.with("output.raster", "resolution = 500.0\npmtiles = \"terrarium\""));
     let server = WebServer::of(&[("/returns.las", LasFile::new(4, 7, 0, 500).las())]);
     documents.run(

@@ -1,7 +1,8 @@
 // node view.mjs OUTPUT CHROMIUM SCREENSHOT.png [PAGE [REQUEST.json]]: opens what a job wrote to the folder OUTPUT in a headless
 // Chromium and prints as JSON what it shows: triangles, bounds, and the heights at the "places" of the request, a list of [x, y] in
 // metres from the scene's origin. PAGE "view", the default, shows tileset.json with 3d-tiles-renderer and terrain.glb with
-// GLTFLoader, both in three.js. PAGE "cesium" shows tileset.json on the globe with CesiumJS.
+// GLTFLoader, both in three.js. PAGE "cesium" shows tileset.json on the globe with CesiumJS,
+// and PAGE "terrain" shows terrain/ there, with imagery: its request has "places" with heights, and "views".
 import { createServer } from 'node:http';
 import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
@@ -30,6 +31,7 @@ async function answer(request, response) {
   try {
     const bytes = await readFile(file);
     response.setHeader('Content-Type', TYPES[extname(file)] ?? 'application/octet-stream');
+    if (extname(file) === '.terrain') response.setHeader('Content-Encoding', 'gzip');
     response.end(bytes);
   } catch {
     response.statusCode = 404;

@@ -28,3 +28,4 @@ mod raster;
 mod read_errors;
 mod signals;
 mod tasks;
+mod terrain_tiles;

@@ -18,6 +18,7 @@ pub(super) const TABLES: [&str; 10] = [
     "[output]",
     "[output.raster]",
     "[output.contours]",
+    "[output.terrain]",
     "[limits]",
 ];
 
@@ -53,6 +54,7 @@ pub(super) fn load(table: &str, key: &str, value: Value) -> Result<(), String> {
         }
         "[[breaklines]]" => drop(place.insert("files".into(), vec!["a.gpkg"].into())),
         "[output.contours]" if key != "levels" => drop(place.insert("interval".into(), Value::Float(1.0))),
+        "[output.terrain]" => drop(place.insert("format".into(), "quantized-mesh".into())),
         "[output.raster]" => drop(place.insert("resolution".into(), Value::Float(1.0))),
         _ if names.len() == 1 => {
             place = whole.get(names[0]).and_then(Value::as_table).cloned().unwrap_or_default();

@@ -42,7 +42,7 @@ pub struct ZoomStats {
     pub triangles: u64,
     /// How far in metres the vertices of the next finer zoom may be from them, along the vertical; 0 at the finest zoom.
     pub error_to_finer: f64,
-    /// The step that heights are rounded to, in metres.
+    /// The step that heights on borders are rounded to, in metres; others have that or a finer one.
     pub height_step: f64,
 }
 

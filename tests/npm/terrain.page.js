@@ -1,0 +1,83 @@
+// The page of terrain.html: shows terrain/ on a globe with imagery, and sends the server the heights at some places and how much of the
+// background is seen.
+const { Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color, EllipsoidTerrainProvider, HeadingPitchRange, Math: Angles, Matrix4, UrlTemplateImageryProvider, sampleTerrainMostDetailed } = window.Cesium;
+const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+const complaints = [];
+for (const kind of ['error', 'warn']) {
+  const say = console[kind];
+  console[kind] = (...words) => { complaints.push(words.join(' ')); say.apply(console, words); };
+}
+
+// A picture for all tiles of the imagery: green and brown squares.
+function picture() {
+  const canvas = Object.assign(document.createElement('canvas'), { width: 64, height: 64 });
+  const pen = canvas.getContext('2d');
+  for (let square = 0; square < 16; square += 1) {
+    pen.fillStyle = (square + (square >> 2)) % 2 ? '#4a7a3a' : '#8a6a4a';
+    pen.fillRect(16 * (square % 4), 16 * (square >> 2), 16, 16);
+  }
+  return canvas.toDataURL();
+}
+
+// Renders until no tile is missing.
+async function settled(scene) {
+  for (let calm = 0; calm < 10;) {
+    scene.render();
+    await pause(20);
+    calm = scene.globe.tilesLoaded ? calm + 1 : 0;
+  }
+}
+
+// Returns how many pixels have the colour of the background.
+function holes(scene) {
+  const copy = Object.assign(document.createElement('canvas'), { width: scene.canvas.width, height: scene.canvas.height });
+  const pen = copy.getContext('2d');
+  pen.drawImage(scene.canvas, 0, 0);
+  const { data } = pen.getImageData(0, 0, copy.width, copy.height);
+  let count = 0;
+  for (let at = 0; at < data.length; at += 4) count += data[at] > 200 && data[at + 1] < 60 && data[at + 2] > 200;
+  return count;
+}
+
+async function show({ places, views }) {
+  const provider = await CesiumTerrainProvider.fromUrl('/out/terrain', { requestVertexNormals: true });
+  const widget = new CesiumWidget('scene', {
+    baseLayer: false, skyBox: false, skyAtmosphere: false, useDefaultRenderLoop: false, terrainProvider: new EllipsoidTerrainProvider(),
+    creditContainer: document.createElement('div'), contextOptions: { webgl: { preserveDrawingBuffer: true } },
+  });
+  widget.resize();
+  const { scene } = widget;
+  const failures = [];
+  provider.errorEvent.addEventListener(({ message }) => failures.push(message));
+  scene.renderError.addEventListener((_, error) => failures.push(String(error)));
+  scene.terrainProvider = provider;
+  scene.backgroundColor = Color.MAGENTA;
+  Object.assign(scene.globe, { baseColor: Color.GRAY, enableLighting: false, showGroundAtmosphere: false, depthTestAgainstTerrain: true });
+  scene.imageryLayers.addImageryProvider(new UrlTemplateImageryProvider({ url: picture(), maximumLevel: 20 }));
+
+  const tileset = await (await fetch('/out/tileset.json')).json();
+  const toEarth = Matrix4.fromArray(tileset.root.transform);
+  const positions = places.map((place) => Cartographic.fromCartesian(Matrix4.multiplyByPoint(toEarth, Cartesian3.fromArray(place), new Cartesian3())));
+  const truth = positions.map((position) => position.height);
+  const sampled = await sampleTerrainMostDetailed(provider, positions.map((position) => position.clone()));
+  const off = sampled.map((position, k) => position.height - truth[k]);
+
+  const background = [];
+  const middle = Cartesian3.fromRadians(positions[0].longitude, positions[0].latitude, truth[0]);
+  for (const [heading, pitch, range] of views) {
+    scene.camera.lookAt(middle, new HeadingPitchRange(Angles.toRadians(heading), Angles.toRadians(pitch), range));
+    await settled(scene);
+    background.push(holes(scene));
+    if (failures.length > 0) throw new Error(failures.join('; '));
+  }
+  return { off, background, zoom: provider.availability.computeMaximumLevelAtPosition(positions[0]), hasNormals: provider.hasVertexNormals, complaints, picture: scene.canvas.toDataURL('image/png') };
+}
+
+let result;
+try {
+  result = await show(await (await fetch('/request.json')).json());
+} catch (error) {
+  result = { error: String(error.stack ?? error) };
+}
+await fetch('/result', { method: 'POST', body: JSON.stringify(result) });
