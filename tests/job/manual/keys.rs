@@ -8,7 +8,7 @@ use toml::{Table, Value};
 const LEAST: &str = "[input]\nfiles = [\"a.laz\"]\n[output]\ndirectory = \"out\"\n";
 
 /// The tables of a configuration.
-pub(super) const TABLES: [&str; 10] = [
+pub(super) const TABLES: [&str; 11] = [
     "[input]",
     "[input.bare_earth]",
     "[input.csv]",
