@@ -30,6 +30,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use survey::diff::{self, DiffRequest};
 use survey::profile::{self, ProfileRequest};
+use survey::written::DifferenceOutput;
 use sys::threads;
 use sys::threads::on_threads;
 use sys::{interrupt, say, shortage, terminal};
@@ -353,6 +354,11 @@ fn compare_terrains(options: &DiffOptions, print: PrintOptions) -> Result<ExitCo
         threshold: options.threshold,
         areas: options.areas.clone(),
         memory: options.memory,
+        output: options.output.clone().map(|directory| DifferenceOutput {
+            directory,
+            resolution: options.resolution,
+            range: options.range,
+        }),
     };
     let difference = on_threads(threads::available(), || diff::run(&request))?;
     print_result(&difference, print).map(|()| ExitCode::SUCCESS)

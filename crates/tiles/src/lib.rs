@@ -22,6 +22,7 @@ pub mod options;
 pub mod page;
 pub mod preview;
 pub mod raster;
+pub mod rewritten;
 pub mod tile;
 pub mod tiles3d;
 
