@@ -1,6 +1,7 @@
 //! What the stages of a job usually cost, for the estimate of the time left.
 
 use crate::plan::job_plan::Plan;
+use crate::preflight::contour_estimate::ContourEstimate;
 use crate::publish::raster::check::planned_raster;
 use points::FileFormat;
 
@@ -20,8 +21,9 @@ const EXPORT: f64 = 400.0;
 const RASTER: f64 = 170.0;
 const RASTER_STORED: f64 = 60.0;
 
-/// The same for each point of contour lines: it depends on how many there are.
-const CONTOURS: f64 = 250.0;
+/// The same for each point of contour lines, and for each point of the terrain where they are traced.
+const CONTOURS: f64 = 150.0;
+const TRACE: f64 = 50.0;
 
 fn cost_of_reading(format: FileFormat) -> f64 {
     match format {
@@ -32,7 +34,8 @@ fn cost_of_reading(format: FileFormat) -> f64 {
 }
 
 /// Returns the stages of the job in their order, by name, with the expected cost of each.
-pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
+/// `contours` are those that the job is expected to write.
+pub(crate) fn stage_costs(plan: &Plan, contours: Option<&ContourEstimate>) -> Vec<(&'static str, f64)> {
     let sources = plan.inputs.iter().map(|input| &input.source);
     let reading = sources.map(|source| source.records as f64 * cost_of_reading(source.format)).sum();
     let points = plan.records as f64;
@@ -44,7 +47,7 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
     };
     let ground = if plan.options.input.finds_ground() { GROUND } else { 0.0 };
     let selecting = if plan.options.output.selects() { SELECT } else { 0.0 };
-    let contours = if plan.options.output.contours.is_some() { CONTOURS } else { 0.0 };
+    let contours = contours.map_or(0.0, |lines| lines.points as f64 * CONTOURS + points * TRACE);
     vec![
         ("read", reading),
         ("select", points * (ground + selecting)),
@@ -52,7 +55,7 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
         ("levels", points * LEVELS),
         ("raster", raster),
         ("export", points * exports),
-        ("contours", points * contours),
+        ("contours", contours),
         ("publish", points * PUBLISH),
     ]
 }
