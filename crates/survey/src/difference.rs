@@ -1,6 +1,6 @@
 //! What a comparison has found, for people and programs.
 
-use crate::written::WrittenDifference;
+use crate::written::{WrittenDifference, short_name};
 use overlay::{FixedSum, Totals};
 use serde::Serialize;
 use std::fmt;
@@ -102,16 +102,6 @@ impl Scale {
         let only = area.without(common).value()?;
         let is_rounding = only <= ROUNDING * area.value()?;
         Some(if is_rounding { 0.0 } else { only * self.plane * self.plane })
-    }
-}
-
-/// Returns a unit of length as tables have it.
-fn short_name(unit: &str) -> &str {
-    match unit {
-        "foot" => "ft",
-        "US survey foot" => "US ft",
-        "kilometre" => "km",
-        other => other,
     }
 }
 

@@ -18,7 +18,7 @@ use crate::preflight::kept_points::{KeptPoints, has_filter};
 use crate::preflight::selection_estimate::estimated_vertices;
 use crate::progress::number_text::{grouped, mebibytes};
 use crate::publish::contours::check::check_contours;
-use crate::publish::height_offset_check::check_height_offset;
+use crate::publish::height_offset_check::{check_height_offset, unused_height_offset};
 use crate::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::publish::raster::check::{check_raster, planned_raster};
 use crate::report::skipped_inputs::write_skipped;
@@ -200,6 +200,7 @@ impl Preflight {
         let resolution = plan.frame.extras().resolution;
         let surface_sample = SurfaceShares::of_kept(&plan.sample);
         let mut warnings = plan.all_warnings();
+        warnings.extend(unused_height_offset(plan));
         let of_sample = |warning: String| format!("in a sample of the points: {warning}");
         warnings.extend(no_ground(&options.input, &plan.sample).map(of_sample));
         warnings.extend(plan.sample.notes.iter().cloned().map(of_sample));

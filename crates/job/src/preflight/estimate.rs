@@ -191,7 +191,7 @@ fn export_per_point(format: ExportFormat) -> u64 {
         ExportFormat::Landxml => 120,
         ExportFormat::Dxf => 400,
         ExportFormat::Obj => 85,
-        ExportFormat::Ply => 3 * 8 + 2 * 13,
+        ExportFormat::Ply => 3 * 8 + 3 + 2 * 13,
     }
 }
 

@@ -15,6 +15,11 @@ pub fn grouped(value: u64) -> String {
     text
 }
 
+/// Returns a count and what is counted, which is named in the singular.
+pub fn counted(count: u64, what: &str) -> String {
+    format!("{} {what}{}", grouped(count), if count == 1 { "" } else { "s" })
+}
+
 /// Returns an amount of bytes as whole mebibytes.
 pub fn mebibytes(bytes: u64) -> String {
     format!("{} MiB", grouped(bytes >> 20))

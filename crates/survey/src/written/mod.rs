@@ -52,6 +52,8 @@ pub struct WrittenRaster {
     pub file: String,
     /// The side of a cell in units of x and y.
     pub resolution: f64,
+    /// The unit of x and y.
+    pub unit: String,
     /// Columns and rows.
     pub size: [u32; 2],
     /// Cells with a difference.
@@ -120,9 +122,9 @@ impl Compared<'_> {
             Some(raster) => Some(raster.write(folder)?),
             None => None,
         };
-        let [_, unit] = self.terrains[1].system().units();
-        let legend =
-            Legend::new(output.range.unwrap_or_else(|| self.usual_range(drawn.as_ref())), self.threshold, unit);
+        let [unit, unit_z] = self.terrains[1].system().units();
+        let range = output.range.unwrap_or_else(|| self.usual_range(drawn.as_ref()));
+        let legend = Legend::new(range, self.threshold, unit_z);
         let tiles = ColoredTiles::new(self, legend).write(folder)?;
         if tiles.is_none() {
             warnings.push(
@@ -133,6 +135,7 @@ impl Compared<'_> {
         let raster = drawn.map(|drawn| WrittenRaster {
             file: path(folder::RASTER),
             resolution,
+            unit,
             size: drawn.size,
             cells: drawn.changes.total(),
         });
@@ -156,11 +159,17 @@ fn shown(path: &Path) -> String {
 impl fmt::Display for WrittenDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f)?;
-        if let Some(WrittenRaster { file, resolution, size: [columns, rows], .. }) = &self.raster {
-            writeln!(f, "{:<24}{file}, {columns} x {rows} cells with sides of {resolution}", "raster of differences")?;
+        if let Some(WrittenRaster { file, resolution, unit, size: [columns, rows], .. }) = &self.raster {
+            writeln!(
+                f,
+                "{:<24}{file}, {columns} x {rows} cells, side {resolution} {}",
+                "raster of differences",
+                short_name(unit)
+            )?;
         }
         if let Some(WrittenMesh { file, legend: Legend { range, threshold, unit, .. }, .. }) = &self.mesh {
             writeln!(f, "{:<24}{file}; to see it: gdt-batch view {}", "mesh in colours", self.directory)?;
+            let unit = short_name(unit);
             writeln!(f, "{:<24}from red (cut of {range} {unit} or more) over white to blue (fill)", "colours")?;
             if *threshold > 0.0 {
                 writeln!(f, "{:<24}light grey below {threshold} {unit}, grey outside of the common area", "")?;
@@ -185,4 +194,14 @@ pub(crate) fn refuse_too_many(resolution: f64, [width, height]: [f64; 2]) -> Res
         "--resolution {resolution} makes {columns:.0} x {rows:.0} cells, more than a file holds: give {} or more",
         round_up(resolution * factor)
     )))
+}
+
+/// Returns a unit of length as tables have it.
+pub(crate) fn short_name(unit: &str) -> &str {
+    match unit {
+        "foot" => "ft",
+        "US survey foot" => "US ft",
+        "kilometre" => "km",
+        other => other,
+    }
 }
