@@ -1,7 +1,8 @@
 //! Cut and fill between terrains, and heights along lines.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -131,7 +132,10 @@ fn difference_as_files(surveys: &Surveys) {
         }
     }
     // Again, on one thread: the same bytes in place of those before.
-    let contents = || files_below(&out).into_iter().map(|path| (fs::read(&path).unwrap(), path)).collect::<Vec<_>>();
+    let contents = || {
+        let named = |path: PathBuf| (path.clone(), fs::read(path).unwrap());
+        files_below(&out).into_iter().map(named).collect::<BTreeMap<_, _>>()
+    };
     let before = contents();
     let added = ["-o", named, "--resolution", "10"];
     let paths = [surveys.before.out(), surveys.after.out()].map(|out| out.to_str().unwrap().to_owned());

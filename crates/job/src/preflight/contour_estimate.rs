@@ -21,10 +21,10 @@ use std::ops::AddAssign;
 use sys::{Error, Result, interrupt};
 use tiles::contour_options::{ContourLevels, ContourOptions};
 
-/// Bytes of `contours.gpkg` for a point of a line, with its share of the line and of the spatial index; 16 in long lines.
-const GEOPACKAGE_PER_POINT: u64 = 20;
+/// Bytes of `contours.gpkg` for a point of a line, with its share of the line and of the spatial index.
+const GEOPACKAGE_PER_POINT: u64 = 32;
 /// Bytes of `contours.dxf` for a point of a line: two coordinates as text, and what names them.
-const DRAWING_PER_POINT: u64 = 50;
+const DRAWING_PER_POINT: u64 = 77;
 /// Bytes of a piece of a line for a point, while pieces wait to be joined.
 const WAITING_PER_POINT: u64 = 18;
 
@@ -49,6 +49,12 @@ pub struct ContourEstimate {
 }
 
 impl ContourEstimate {
+    /// Returns the bytes that the disk must have for the files: some more, since a sample often shows a fifth less than there is, and a third less
+    /// where flights overlap over trees.
+    pub(crate) fn disk(&self) -> u64 {
+        self.bytes / 2 * 3
+    }
+
     /// Returns the bytes of temporary files.
     pub(crate) fn temporary(&self) -> u64 {
         self.points * WAITING_PER_POINT

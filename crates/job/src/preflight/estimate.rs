@@ -89,7 +89,7 @@ impl DiskEstimate {
         let in_tiles = tile_bytes(points, tiles, &options.output, max_one_file, points > per_tile);
         let page = if options.output.page { PAGE } else { 0 };
         let (exports, mesh) = export_bytes(points, &options.output);
-        let in_contours = contours.map_or(0, |contours| contours.bytes);
+        let in_contours = contours.map_or(0, ContourEstimate::disk);
         let results = in_tiles + pixels * PREVIEW_PER_PIXEL + page + raster + exports + in_contours;
         // The raster goes together before the mesh is numbered, and that is done before contour lines are traced.
         let beside = raster.max(mesh).max(contours.map_or(0, ContourEstimate::temporary));

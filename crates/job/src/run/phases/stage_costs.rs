@@ -21,8 +21,10 @@ const EXPORT: f64 = 400.0;
 const RASTER: f64 = 170.0;
 const RASTER_STORED: f64 = 60.0;
 
-/// The same for each point of contour lines, and for each point of the terrain where they are traced.
-const CONTOURS: f64 = 150.0;
+/// The same for each point of contour lines, for each that is drawn for CAD programs too, and for each point of the terrain where they are
+/// traced.
+const CONTOURS: f64 = 200.0;
+const DRAWN: f64 = 450.0;
 const TRACE: f64 = 50.0;
 
 fn cost_of_reading(format: FileFormat) -> f64 {
@@ -47,7 +49,9 @@ pub(crate) fn stage_costs(plan: &Plan, contours: Option<&ContourEstimate>) -> Ve
     };
     let ground = if plan.options.input.finds_ground() { GROUND } else { 0.0 };
     let selecting = if plan.options.output.selects() { SELECT } else { 0.0 };
-    let contours = contours.map_or(0.0, |lines| lines.points as f64 * CONTOURS + points * TRACE);
+    let is_drawn = plan.options.output.contours.as_ref().is_some_and(|options| options.dxf);
+    let of_line_point = CONTOURS + if is_drawn { DRAWN } else { 0.0 };
+    let contours = contours.map_or(0.0, |lines| lines.points as f64 * of_line_point + points * TRACE);
     vec![
         ("read", reading),
         ("select", points * (ground + selecting)),
