@@ -118,5 +118,5 @@ fn a_ring_beside_the_only_outline_is_named() {
     let features = Features::areas(&[("lake", vec![clockwise(&SQUARE), other(&BESIDE)])]);
     let job = survey.job_with(&[shapefile(survey.folder(), "lakes", &features)], "kind = \"lake\"");
     let text = job.run_with(&["check"]).succeeded().out;
-    assert!(text.contains("a hole outside of their outline"), "{text}");
+    assert!(text.contains("a hole outside of its outline"), "{text}");
 }

@@ -1,7 +1,7 @@
 //! The tiles of the later terrain, of all levels, with the colours of the difference. Everything else in them stays: each vertex has its
 //! position, bit for bit.
 
-use crate::written::Compared;
+use crate::written::compared::Compared;
 use crate::written::folder::{DifferenceFolder, LEVELS, TILES, TILESET, TILESETS};
 use crate::written::ramp::Legend;
 use overlay::Places;

@@ -8,20 +8,18 @@ pub(crate) mod ramp;
 pub(crate) mod waiting_blocks;
 
 mod colored_tiles;
+pub(crate) mod compared;
 mod raster;
 
-use crate::common_lattice::CommonLattice;
-use crate::tile_meshes::{MeshCache, TileFacts};
 use crate::written::colored_tiles::ColoredTiles;
+use crate::written::compared::Compared;
 use crate::written::folder::DifferenceFolder;
-use crate::written::ramp::{Legend, round_up, spacing};
-use crate::written::raster::{DifferenceRaster, DrawnRaster};
-use overlay::{FixedSum, Rectangle};
+use crate::written::ramp::Legend;
+use crate::written::raster::DifferenceRaster;
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use sys::{Error, Result, Warnings};
-use terrain::FinishedTerrain;
+use sys::{Result, Warnings};
 
 /// What is to be written.
 #[derive(Clone, Debug)]
@@ -71,40 +69,7 @@ pub struct WrittenMesh {
     pub legend: Legend,
 }
 
-/// Two terrains that have been compared.
-pub(crate) struct Compared<'a> {
-    pub(crate) terrains: [&'a FinishedTerrain; 2],
-    pub(crate) lattice: &'a CommonLattice,
-    /// Of all tiles of each terrain.
-    pub(crate) facts: [&'a [TileFacts]; 2],
-    /// The area of each in square steps.
-    pub(crate) areas: [FixedSum; 2],
-    /// Tiles of the earlier terrain.
-    pub(crate) cache: &'a MeshCache<'a>,
-    /// How many tiles may be in memory at the same time.
-    pub(crate) lanes: usize,
-    /// About how many bytes of memory may be used.
-    pub(crate) memory: u64,
-    /// Smaller changes count as none, in units of heights.
-    pub(crate) threshold: f64,
-    /// The greatest rise or fall, in steps.
-    pub(crate) greatest: f64,
-}
-
 impl Compared<'_> {
-    /// Returns the smallest rectangle around both terrains' common area, in steps of the common lattice, which may be empty.
-    fn common_box(&self) -> Rectangle {
-        let around = |facts: &[TileFacts]| facts.iter().fold(Rectangle::EMPTY, |all, tile| all.joined(tile.bounds));
-        around(self.facts[0]).common(around(self.facts[1]))
-    }
-
-    /// Returns the side of a cell in units of x and y that suits the finer terrain.
-    fn usual_resolution(&self) -> f64 {
-        let of = |k: usize| spacing(self.areas[k], self.facts[k].iter().map(|tile| tile.triangles).sum());
-        let steps = [0, 1].into_iter().filter_map(of).fold(f64::INFINITY, f64::min);
-        round_up(if steps.is_finite() { steps } else { 1.0 } * self.lattice.step_lengths()[0])
-    }
-
     /// Writes all files.
     ///
     /// # Errors
@@ -123,7 +88,7 @@ impl Compared<'_> {
             None => None,
         };
         let [unit, unit_z] = self.terrains[1].system().units();
-        let range = output.range.unwrap_or_else(|| self.usual_range(drawn.as_ref()));
+        let range = output.range.unwrap_or_else(|| self.usual_range(drawn.as_ref().map(|drawn| &drawn.changes)));
         let legend = Legend::new(range, self.threshold, unit_z);
         let tiles = ColoredTiles::new(self, legend).write(folder)?;
         if tiles.is_none() {
@@ -141,14 +106,6 @@ impl Compared<'_> {
         });
         let mesh = tiles.map(|(tiles, legend)| WrittenMesh { file: path(folder::TILESET), tiles, legend });
         Ok(WrittenDifference { directory: shown(&output.directory), raster, mesh })
-    }
-
-    /// Returns the range of colours in units of heights: nearly all changes are below it, and none is far below.
-    fn usual_range(&self, drawn: Option<&DrawnRaster>) -> f64 {
-        let step = self.lattice.step_lengths()[1];
-        let greatest = (self.greatest * step).max(step);
-        let usual = drawn.and_then(|drawn| drawn.changes.usual_limit(self.threshold as f32));
-        round_up(usual.map_or(greatest, |usual| f64::from(usual).min(greatest)).max(self.threshold).max(step))
     }
 }
 
@@ -179,21 +136,6 @@ impl fmt::Display for WrittenDifference {
         }
         Ok(())
     }
-}
-
-/// Refuses a number of cells that no file holds.
-pub(crate) fn refuse_too_many(resolution: f64, [width, height]: [f64; 2]) -> Result<()> {
-    const MOST: f64 = (1u64 << 38) as f64;
-    const MOST_ALONG: f64 = (i32::MAX - 2) as f64;
-    let [columns, rows] = [width, height].map(|side| (side / resolution).ceil() + 1.0);
-    if columns <= MOST_ALONG && rows <= MOST_ALONG && columns * rows <= MOST {
-        return Ok(());
-    }
-    let factor = (columns * rows / MOST).sqrt().max(columns.max(rows) / MOST_ALONG);
-    Err(Error::Config(format!(
-        "--resolution {resolution} makes {columns:.0} x {rows:.0} cells, more than a file holds: give {} or more",
-        round_up(resolution * factor)
-    )))
 }
 
 /// Returns a unit of length as tables have it.

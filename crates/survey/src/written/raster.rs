@@ -3,10 +3,10 @@
 //! Both terrains are drawn into windows over the same cells, in steps of the common lattice, so that equal heights differ by exactly 0
 //! whatever the lattices. Overviews follow from the windows, as those of `terrain.tif` do.
 
+use crate::written::compared::{Compared, refuse_too_many};
 use crate::written::folder::{DifferenceFolder, RASTER};
 use crate::written::ramp::ChangeCounts;
 use crate::written::waiting_blocks::WaitingBlocks;
-use crate::written::{Compared, refuse_too_many};
 use overlay::Rectangle;
 use rayon::prelude::*;
 use rust_decimal::Decimal;
