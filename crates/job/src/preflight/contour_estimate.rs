@@ -17,7 +17,6 @@ use ground::{CoveredArea, Ground, LowestHeights, PointCollector, Scale};
 use points::surface::{MeshOf, Surface};
 use rayon::prelude::*;
 use serde::Serialize;
-use std::ops::AddAssign;
 use sys::{Error, Result, interrupt};
 use tiles::contour_options::{ContourLevels, ContourOptions};
 
@@ -111,17 +110,15 @@ struct MeshFigures {
     double_area: i128,
 }
 
-impl AddAssign for MeshFigures {
-    fn add_assign(&mut self, other: MeshFigures) {
+impl MeshFigures {
+    fn add(&mut self, other: MeshFigures) {
         self.points += other.points;
         self.vertices += other.vertices;
         self.crossings += other.crossings;
         self.triangles += other.triangles;
         self.double_area += other.double_area;
     }
-}
 
-impl MeshFigures {
     /// Returns how many points of lines there are for a vertex.
     fn crossings_per_vertex(&self) -> f64 {
         self.crossings as f64 / self.vertices.max(1) as f64
@@ -148,8 +145,8 @@ impl ContourSample {
         let found = samples.par_iter().map(figures).collect::<Result<Vec<_>>>()?;
         let [mut all, mut quarter] = [MeshFigures::default(); 2];
         for [of_all, of_quarter] in found {
-            all += of_all;
-            quarter += of_quarter;
+            all.add(of_all);
+            quarter.add(of_quarter);
         }
         let [width, height] = [0, 1].map(|axis| plan.extent.extent(axis).max(1) as f64);
         Ok(Some(ContourSample { all, quarter, area: width * height, has_drawing: options.dxf }))

@@ -37,7 +37,7 @@ pub(crate) fn unused_height_offset(plan: &Plan) -> Option<String> {
     let is_wanted = output.height_offset.is_some() && output.format != OutputFormat::Glb;
     let why = is_wanted.then(|| globe_system(&plan.crs, plan.frame.extras().metres_per_unit).err()).flatten()?;
     Some(format!(
-        "[output] height_offset has no effect, because the terrain is not placed on the globe: {why}; fix: [input] crs, such as crs = \
-         \"EPSG:26915\", or leave height_offset out"
+        "[output] height_offset has no effect, because the terrain is not placed on the globe: {why}; fix: set [input] crs = \
+         \"EPSG:...\", or leave [output] height_offset out"
     ))
 }
