@@ -16,7 +16,7 @@ use crate::preflight::estimate::DiskEstimate;
 use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::preflight::kept_points::{KeptPoints, has_filter};
 use crate::preflight::selection_estimate::estimated_vertices;
-use crate::progress::number_text::{grouped, mebibytes};
+use crate::progress::number_text::{grouped, mebibytes, rough};
 use crate::publish::contours::check::check_contours;
 use crate::publish::height_offset_check::{check_height_offset, unused_height_offset};
 use crate::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
@@ -306,12 +306,6 @@ fn longest_triangle(plan: &Plan) -> Option<f64> {
     let (longest, step) = (plan.frame.longest_triangle()[0], plan.frame.resolution_metres()[0]);
     let is_longer = (0..2).any(|axis| plan.extent.extent(axis) as f64 * step > longest);
     (is_longer && plan.options.input.resolution.step().is_none()).then_some(longest)
-}
-
-/// Returns a number with its first two digits: an estimate tells no more.
-fn rough(number: u64) -> u64 {
-    let unit = 10u64.pow(number.checked_ilog10().unwrap_or(0).saturating_sub(1));
-    (number + unit / 2) / unit * unit
 }
 
 impl fmt::Display for Preflight {

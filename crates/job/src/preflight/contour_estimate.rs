@@ -9,7 +9,7 @@ use crate::plan::job_plan::Plan;
 use crate::preflight::kept_points::KeptPoints;
 use crate::preflight::sampled_points::sampled_points;
 use crate::preflight::selection_estimate::selected_points;
-use crate::progress::number_text::{grouped, mebibytes};
+use crate::progress::number_text::{grouped, mebibytes, rough};
 use crate::publish::contours::check::TerrainLevels;
 use delaunay::geometry::Site;
 use delaunay::triangulation::canonical;
@@ -79,7 +79,7 @@ impl ContourEstimate {
         };
         Some(format!(
             "the contour lines will be large: about {} points, {times} times as many as the terrain has vertices, in {}; fix: {interval}{surface}",
-            grouped(self.points),
+            grouped(rough(self.points)),
             mebibytes(self.bytes)
         ))
     }
