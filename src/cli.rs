@@ -147,7 +147,8 @@ pub enum CliCommand {
     /// Compute cut and fill between two terrains, exactly, over the area that both cover.
     ///
     /// Overlays the triangles of both. Cut is what was removed: AFTER lies below BEFORE. Fill is what was added. Both must have the same
-    /// CRS, units and vertical datum. Results in metres, and in the units of the terrains.
+    /// CRS, units and vertical datum. Results in metres, and in the units of the terrains. With --output, also writes difference.tif (AFTER
+    /// minus BEFORE, a GeoTIFF) and AFTER as 3D Tiles in colours, red for cut and blue for fill, which `gdt-batch view` shows.
     Diff(DiffOptions),
     /// Write the heights of a terrain along lines as CSV.
     ///
@@ -292,6 +293,15 @@ pub struct DiffOptions {
     /// Polygons that get figures of their own: GeoJSON, GeoPackage or Shapefile. Their attribute "name" is shown.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub areas: Option<PathBuf>,
+    /// Also write a raster of the differences and a mesh in their colours to this folder: a new one, or that of an earlier difference.
+    #[arg(long, short, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub output: Option<PathBuf>,
+    /// The side of a cell of the raster, in units of x and y. Default: about the distance of the points of the finer terrain.
+    #[arg(long, value_name = "LENGTH", requires = "output", value_parser = length)]
+    pub resolution: Option<f64>,
+    /// The change with the strongest colours, in units of the heights. Default: nearly all changes are smaller.
+    #[arg(long, value_name = "HEIGHT", requires = "output", value_parser = length)]
+    pub range: Option<f64>,
     /// The memory that diff may use, such as "4 GiB".
     #[arg(long, default_value = "4 GiB", value_parser = memory)]
     pub memory: u64,
@@ -327,6 +337,11 @@ fn host_name(text: &str) -> Result<String, String> {
         return Err("give the name alone, such as maps.example.org, without http:// and without a port".into());
     }
     Ok(text.into())
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    let length = text.parse().ok().filter(|length: &f64| length.is_finite() && *length > 0.0);
+    length.ok_or_else(|| "give a number above 0, such as 0.5".into())
 }
 
 fn threshold(text: &str) -> Result<f64, String> {

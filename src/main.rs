@@ -29,7 +29,8 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use survey::diff::{self, DiffRequest};
-use survey::profile::{self, ProfileRequest};
+use survey::profile::{self, Profile, ProfileRequest};
+use survey::written::DifferenceOutput;
 use sys::threads;
 use sys::threads::on_threads;
 use sys::{interrupt, say, shortage, terminal};
@@ -353,6 +354,11 @@ fn compare_terrains(options: &DiffOptions, print: PrintOptions) -> Result<ExitCo
         threshold: options.threshold,
         areas: options.areas.clone(),
         memory: options.memory,
+        output: options.output.clone().map(|directory| DifferenceOutput {
+            directory,
+            resolution: options.resolution,
+            range: options.range,
+        }),
     };
     let difference = on_threads(threads::available(), || diff::run(&request))?;
     print_result(&difference, print).map(|()| ExitCode::SUCCESS)
@@ -370,21 +376,35 @@ fn write_profile(terrain: &Path, lines: &Path, output: Option<&Path>, print: Pri
         profile.warnings.iter().for_each(|warning| say(&format!("warning: {warning}")));
     }
     match output {
-        Some(file) => write_new_table(file, &profile.to_csv())?,
-        None => print_text(&profile.to_csv())?,
+        Some(file) => write_new_table(file, &profile)?,
+        None => print_table(&profile)?,
     }
     Ok(ExitCode::SUCCESS)
 }
 
+/// Prints a table, row by row.
+fn print_table(profile: &Profile) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match profile.write_csv(|piece| out.write_all(piece.as_bytes())).and_then(|()| out.flush()) {
+        // The reader has closed the pipe because it has read enough.
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
+        outcome => Ok(outcome.map_err(sys::Error::io("write to", sys::error::STANDARD_OUTPUT))?),
+    }
+}
+
 /// Writes a table to a file, or in place of an earlier table: nothing else is overwritten.
-fn write_new_table(file: &Path, text: &str) -> Result<()> {
+fn write_new_table(file: &Path, profile: &Profile) -> Result<()> {
     let is_table = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
     if file.exists() && !(file.is_file() && is_table) {
         let file = file.display();
         return Err(sys::Error::Config(format!("{file} is there and no CSV file: name another file with -o")).into());
     }
     let partial = file.with_extension("csv.partial");
-    std::fs::write(&partial, text).map_err(sys::Error::io("write", &partial))?;
+    let write = || {
+        let mut out = std::fs::File::create(&partial)?;
+        profile.write_csv(|piece| out.write_all(piece.as_bytes()))
+    };
+    write().map_err(sys::Error::io("write", &partial))?;
     std::fs::rename(&partial, file).map_err(sys::Error::io("write", file))?;
     Ok(())
 }

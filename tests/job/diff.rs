@@ -1,13 +1,18 @@
 //! Cut and fill between terrains, and heights along lines.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use tempfile::TempDir;
+use tiff::decoder::{Decoder, DecodingResult};
+use tiles::color::from_srgb;
+use tiles::gltf::read::read_tile;
 
 use crate::clouds::{self, Cloud};
-use crate::program::{Job, Said, gdt_batch};
+use crate::program::{Job, Said, gdt_batch, gdt_batch_with};
+use crate::tileset::files_below;
 
 /// The member of GeoJSON that states the CRS of the terrains here.
 const CRS: &str = r#"{"type":"name","properties":{"name":"urn:ogc:def:crs:EPSG::26915"}}"#;
@@ -94,8 +99,55 @@ fn a_box_of_fill_has_its_volume_whatever_the_tiles() {
     let higher = surveys.diff(&["--json", "--threshold", "5.5"]).succeeded().json();
     assert_eq!((&higher["fill"], &higher["areas"]), (&0.0.into(), &Value::Null));
     let text = surveys.diff(&[]).succeeded().out;
-    assert!(text.contains("fill") && text.contains("3200000.000 m3"), "{text}");
+    assert!(text.contains("fill") && text.contains("3200000.000 m³"), "{text}");
+    difference_as_files(&surveys);
     damaged_results_are_refused(&surveys);
+}
+
+/// Where the square of 800 m has risen by 5 m, and nowhere else, cells have that difference and vertices the colour of it.
+fn difference_as_files(surveys: &Surveys) {
+    let out = surveys.before.folder().join("changes");
+    let named = out.to_str().unwrap();
+    let written = surveys.diff(&["--json", "-o", named, "--resolution", "10"]).succeeded().json();
+    let [raster, mesh] = ["raster", "mesh"].map(|kind| &written["written"][kind]);
+    assert_eq!((&raster["size"], &raster["cells"]), (&serde_json::json!([80, 80]), &6400.into()));
+    near(&mesh["legend"]["range"], 5.0);
+    let tileset: Value = serde_json::from_slice(&fs::read(out.join("tileset.json")).unwrap()).unwrap();
+    assert_eq!(tileset["asset"]["extras"]["difference"], mesh["legend"]);
+    let mut decoder = Decoder::new(fs::File::open(out.join("difference.tif")).unwrap()).unwrap();
+    let DecodingResult::F32(cells) = decoder.read_image().unwrap() else { panic!() };
+    assert!(cells.iter().all(|cell| *cell == 5.0));
+    let blue = &mesh["legend"]["colors"][4];
+    for path in files_below(&out.join("tiles")) {
+        let plain = surveys.after.out().join(path.strip_prefix(&out).unwrap());
+        let [colored, plain] = [&path, &plain].map(|path| read_tile(path).unwrap());
+        assert_eq!(colored.extras, plain.extras);
+        for (colored, plain) in colored.parts.iter().zip(&plain.parts) {
+            assert_eq!((colored.translation, colored.scale), (plain.translation, plain.scale));
+            assert_eq!(colored.positions.len(), plain.positions.len());
+            let colors = colored.colors.as_ref().unwrap();
+            let near_blue = |[color, wanted]: [u16; 2]| color.abs_diff(wanted) <= 257;
+            let wanted = [0, 1, 2].map(|k| from_srgb([blue[k].as_u64().unwrap() as u8; 3])[0]);
+            assert!(colors.iter().all(|color| (0..3).all(|k| near_blue([color[k], wanted[k]]))), "{path:?}");
+        }
+    }
+    // Again, on one thread: the same bytes in place of those before.
+    let contents = || {
+        let named = |path: PathBuf| (path.clone(), fs::read(path).unwrap());
+        files_below(&out).into_iter().map(named).collect::<BTreeMap<_, _>>()
+    };
+    let before = contents();
+    let added = ["-o", named, "--resolution", "10"];
+    let paths = [surveys.before.out(), surveys.after.out()].map(|out| out.to_str().unwrap().to_owned());
+    let again = [&["diff", &paths[0], &paths[1]], &added[..]].concat();
+    gdt_batch_with(surveys.before.folder(), &again, &[("GDT_PROCESSORS", "1")]).succeeded();
+    assert!(contents() == before);
+    // No folder with anything else in it is touched.
+    let after = surveys.after.out();
+    surveys.diff(&["-o", after.to_str().unwrap()]).refused(2, &["overwrites only what diff has written"]);
+    fs::write(out.join("notes.txt"), "").unwrap();
+    surveys.diff(&["-o", named]).refused(2, &["notes.txt"]);
+    surveys.diff(&["--resolution", "1"]).refused(2, &["--output"]);
 }
 
 fn damaged_results_are_refused(surveys: &Surveys) {

@@ -115,10 +115,13 @@ impl Found {
             let line = head.lines().find_map(|line| line.strip_prefix(element));
             line.unwrap().trim().parse().unwrap()
         };
-        let (vertices, faces) = bytes[end..].split_at(24 * count("element vertex"));
+        let has_colors =
+            head.contains("property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n");
+        let size = if has_colors { 27 } else { 24 };
+        let (vertices, faces) = bytes[end..].split_at(size * count("element vertex"));
         assert_eq!(faces.len(), 13 * count("element face"));
         let vertices = vertices
-            .chunks(24)
+            .chunks(size)
             .map(|vertex| [0, 8, 16].map(|at| hundredths(f64::from_le_bytes(vertex[at..at + 8].try_into().unwrap()))));
         let faces = faces.chunks(13).map(|face| {
             assert_eq!(face[0], 3);

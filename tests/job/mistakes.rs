@@ -91,7 +91,7 @@ const IN_OUTPUT: [(&str, &[&str]); 16] = [
     ),
     (
         "export = [\"obj\", \"land-xml\"]",
-        &["line 5: [output] export is a list of formats: \"landxml\"", "did you mean export = [\"obj\", \"landxml\"]?"],
+        &["line 5: [output] export is a list of \"landxml\"", "did you mean export = [\"obj\", \"landxml\"]?"],
     ),
     ("[limits]\nthreads = \"4\"", &["line 6: [limits] threads takes a number; did you mean threads = 4?"]),
     ("[limits]\nmemory = 8", &["line 6: [limits] memory takes text", "did you mean memory = \"8 GiB\"?"]),

@@ -48,6 +48,13 @@ pub(crate) fn gdt_batch<S: AsRef<std::ffi::OsStr>>(folder: &Path, arguments: &[S
     finish(Command::new(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder))
 }
 
+/// Runs the program with variables in its environment.
+#[track_caller]
+pub(crate) fn gdt_batch_with(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> Said {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
+    finish(command.args(arguments).envs(variables.iter().copied()).current_dir(folder))
+}
+
 /// Runs the program with its standard output going to the file `out`.
 #[track_caller]
 pub(crate) fn gdt_batch_into(out: &str, folder: &Path, arguments: &[&str]) -> Said {

@@ -169,7 +169,9 @@ fn every_document_fits_its_schema_and_every_field_is_in_one() {
     add_jobs_of_one_part(&documents);
     add_a_job_of_parts(&documents);
     let surveys = surveys();
-    documents.add("diff", &surveys.diff(&["--json", "--areas", &surveys.write_areas()]).succeeded().out);
+    let changes = surveys.before.folder().join("changes");
+    let output = ["--json", "--areas", &surveys.write_areas(), "--output", changes.to_str().unwrap()];
+    documents.add("diff", &surveys.diff(&output).succeeded().out);
     let project = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut check = Command::new(python);
     check.arg(project.join("tests/python/schemas.py")).arg(project.join("docs/schemas")).arg(documents.folder.path());

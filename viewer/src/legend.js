@@ -42,10 +42,18 @@ function pointList({ classes, ramp: heights }, georeference) {
   return ramp('Height, about', RAMP.map(rgb), ...heights.map((height) => heightText(height, georeference, places)));
 }
 
+// Tiles of `gdt-batch diff` say what their colours mean.
+function differenceList({ range, threshold, unit, colors, unchanged, outside }) {
+  const others = [[rgb(outside), 'only in the later terrain']];
+  if (threshold > 0) others.unshift([rgb(unchanged), `less than ${threshold} ${unit}`]);
+  const scale = ramp(`Difference (${unit})`, colors.map(rgb), `cut ${range}`, `fill ${range}`);
+  return [...scale, ...list('', others)];
+}
+
 export function showLegend({ mode, terrain, heights, pointColors, exaggeration }) {
   const { georeference } = terrain;
   const parts = {
-    points: () => pointList(pointColors, georeference),
+    points: () => (terrain.difference ? differenceList(terrain.difference) : pointList(pointColors, georeference)),
     height: () => ramp('Height', HEIGHT_COLORS, ...heights.map((height) => heightText(height, georeference))),
     slope: () => ramp('Slope', SLOPE_COLORS, '0°', `${STEEPEST_DEGREES}° and more`),
     levels: () => levelList(terrain.shownLevels),

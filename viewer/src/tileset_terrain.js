@@ -72,6 +72,7 @@ export class TilesetTerrain {
     });
     const { asset } = this.tiles.rootTileset;
     this.georeference = new Georeference(asset?.extras, 'tileset.json');
+    this.difference = asset?.extras?.difference;
     if (asset.copyright) this.attributions.add(asset.copyright);
     const sphere = new Sphere();
     this.tiles.getBoundingSphere(sphere);

@@ -84,7 +84,7 @@ impl Levels {
     }
 
     /// Returns how many levels each of these lattice heights has at or below it.
-    pub(crate) fn counts(&self, heights: impl Iterator<Item = i32> + Clone) -> Vec<u32> {
+    pub fn counts(&self, heights: impl Iterator<Item = i32> + Clone) -> Vec<u32> {
         let [low, high] = heights.clone().fold([i32::MAX, i32::MIN], |[low, high], z| [low.min(z), high.max(z)]);
         let up_to = |levels: &[Level], z: i32| levels.partition_point(|level| level.least <= i64::from(z));
         // A tile spans few of all levels.

@@ -21,6 +21,12 @@ pub trait MeshSource: Sync {
     /// # Errors
     /// [`sys::Error::Io`] if they cannot be read.
     fn triangles(&self, numbers: Range<u64>) -> Result<Vec<[u32; 3]>>;
+
+    /// Returns the sRGB colours of the vertices with these numbers; `None` if the mesh has none.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] if they cannot be read.
+    fn colors(&self, numbers: Range<u64>) -> Result<Option<Vec<[u8; 3]>>>;
 }
 
 /// Counts and measures of a mesh.

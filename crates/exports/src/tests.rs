@@ -16,6 +16,12 @@ use sys::Result;
 struct InMemory {
     vertices: Vec<[i32; 3]>,
     triangles: Vec<[u32; 3]>,
+    has_colors: bool,
+}
+
+/// Returns a colour that tells the number of its vertex.
+fn color(number: u64) -> [u8; 3] {
+    [number as u8, 255 - number as u8, 7]
 }
 
 fn range(range: Range<u64>) -> Range<usize> {
@@ -29,6 +35,10 @@ impl MeshSource for InMemory {
 
     fn triangles(&self, numbers: Range<u64>) -> Result<Vec<[u32; 3]>> {
         Ok(self.triangles[range(numbers)].to_vec())
+    }
+
+    fn colors(&self, numbers: Range<u64>) -> Result<Option<Vec<[u8; 3]>>> {
+        Ok(self.has_colors.then(|| numbers.map(color).collect()))
     }
 }
 
@@ -136,7 +146,12 @@ fn lattice() -> Lattice {
 
 /// Returns what `write` writes of the two tiles, with a breakline.
 fn file(write: impl Fn(&Mesh, &mut Output) -> Result<()>) -> Vec<u8> {
+    file_of(write, false)
+}
+
+fn file_of(write: impl Fn(&Mesh, &mut Output) -> Result<()>, has_colors: bool) -> Vec<u8> {
     let (source, numbers) = numbered(&two_tiles()).unwrap();
+    let source = InMemory { has_colors, ..source };
     let lattice = lattice();
     let lines = [vec![[0, 0, height(0, 0)], [1, 1, height(1, 1)], [2, 2, height(2, 2)]]];
     let mesh = Mesh {
@@ -198,6 +213,33 @@ fn ply_has_all_places_and_faces() {
     let found: Vec<[u32; 3]> = faces.chunks(13).map(|face| [1, 5, 9].map(|at| corner(&face[at..at + 4]))).collect();
     assert_eq!(found, triangles());
     assert!(faces.chunks(13).all(|face| face[0] == 3));
+}
+
+#[test]
+fn ply_has_the_colours_of_vertices_if_there_are_any() {
+    let [plain, colored] = [false, true].map(|has_colors| file_of(write_ply, has_colors));
+    let split = |bytes: &[u8]| {
+        let end = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+        (String::from_utf8_lossy(&bytes[..end]).into_owned(), bytes[end..].to_vec())
+    };
+    let ((head, body), (_, plain_body)) = (split(&colored), split(&plain));
+    let properties = "double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 40\n";
+    assert!(head.contains(properties), "{head}");
+    let (vertices, faces) = body.split_at(30 * 27);
+    let (plain_vertices, plain_faces) = plain_body.split_at(30 * 24);
+    assert_eq!(faces, plain_faces);
+    for (number, (vertex, plain)) in (0..).zip(vertices.chunks(27).zip(plain_vertices.chunks(24))) {
+        assert_eq!((&vertex[..24], &vertex[24..]), (plain, &color(number)[..]));
+    }
+}
+
+#[test]
+fn a_new_vertex_knows_where_it_came_from() {
+    let (mut numbers, squares) = (VertexNumbers::default(), squares(0..3, 0..2));
+    let positions: Vec<[i32; 3]> = squares.iter().flatten().copied().collect();
+    let tile = numbers.add(&tile(&squares)).unwrap();
+    let origins = tile.origins.iter().map(|&origin| positions[origin as usize]);
+    assert!(origins.eq(tile.new_vertices.iter().copied()));
 }
 
 #[test]

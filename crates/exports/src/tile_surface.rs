@@ -4,6 +4,8 @@
 #[derive(Debug, Default)]
 pub struct TileSurface {
     pub(crate) vertices: Vec<[i32; 3]>,
+    /// For each vertex, the index of its position among those that the surface was made of.
+    pub(crate) origins: Vec<u32>,
     pub(crate) triangles: Vec<[u32; 3]>,
     /// The directed edges of triangles that have no triangle of this tile on the other side.
     pub(crate) rim: Vec<[u32; 2]>,
@@ -17,7 +19,7 @@ impl TileSurface {
         let same = first_equal(positions);
         let mut own = vec![UNUSED; positions.len()];
         let mut surface = TileSurface::default();
-        let TileSurface { vertices, triangles: numbered, .. } = &mut surface;
+        let TileSurface { vertices, origins, triangles: numbered, .. } = &mut surface;
         numbered.reserve_exact(triangles.len());
         for triangle in triangles {
             numbered.push(triangle.map(|corner| {
@@ -25,6 +27,7 @@ impl TileSurface {
                 if own[first] == UNUSED {
                     own[first] = vertices.len() as u32;
                     vertices.push(positions[first]);
+                    origins.push(first as u32);
                 }
                 own[first]
             }));

@@ -37,6 +37,8 @@ struct OpenVertex {
 pub struct NumberedTile {
     /// The vertices that no earlier tile has, in the order of their numbers.
     pub new_vertices: Vec<[i32; 3]>,
+    /// For each of them, the index of its position among those that the surface was made of.
+    pub origins: Vec<u32>,
     /// The triangles by the numbers of their corners.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -56,11 +58,12 @@ impl VertexNumbers {
         }
         let mut numbered = NumberedTile::default();
         let mut next = self.summary.vertices;
-        for (number, &place) in numbers.iter_mut().zip(&tile.vertices) {
+        for ((number, &place), &origin) in numbers.iter_mut().zip(&tile.vertices).zip(&tile.origins) {
             if *number == NONE {
                 *number = next;
                 next = next.checked_add(1).filter(|count| *count <= MOST_VERTICES).ok_or(TooManyVertices)?;
                 numbered.new_vertices.push(place);
+                numbered.origins.push(origin);
             }
         }
         numbered.triangles = tile.triangles.iter().map(|triangle| triangle.map(|v| numbers[v as usize])).collect();

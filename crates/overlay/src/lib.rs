@@ -5,12 +5,14 @@
 //! (`totals.rs`). So the sums have the same bits in any order of the triangles, on any number of threads, and however both terrains
 //! are cut into tiles.
 //!
-//! [`compare()`] does this for two meshes, and [`crossings()`] finds where a line crosses triangles.
+//! [`compare()`] does this for two meshes, [`crossings()`] finds where a line crosses triangles, and [`Places`] have heights
+//! on them.
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 mod compare;
 mod crossings;
+mod heights;
 mod join;
 mod mesh;
 mod pair;
@@ -24,6 +26,7 @@ mod zones;
 
 pub use compare::{Comparison, compare};
 pub use crossings::{Crossing, Met, Part, Segment, crossings};
+pub use heights::Places;
 pub use mesh::{MeshError, Point, REACH, TriangleMesh};
 pub use rectangle::Rectangle;
 pub use totals::{FixedSum, Totals};

@@ -2,7 +2,7 @@
 
 use crate::common_lattice::CommonLattice;
 use crate::places::read_places;
-use overlay::{Point, TriangleMesh, Zones};
+use overlay::{Comparison, Point, TriangleMesh, Zones, compare};
 use points::lines::{LineFeature, LineShape};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
@@ -47,6 +47,7 @@ pub(crate) fn read_areas(
 
 fn mesh_of(parts: &[LineFeature], lattice: &CommonLattice) -> std::result::Result<TriangleMesh, &'static str> {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    let mut meshes = Vec::with_capacity(parts.len());
     for part in parts {
         let LineShape::Area(outlines) = &part.shape else {
             return Err("is a line, and only areas have volumes: make it a polygon, or leave it out");
@@ -58,10 +59,34 @@ fn mesh_of(parts: &[LineFeature], lattice: &CommonLattice) -> std::result::Resul
             .ok_or("lies far outside of the terrain: correct its coordinates or its CRS")?;
         let first = u32::try_from(vertices.len()).unwrap_or(u32::MAX);
         let (more, corners) = triangulated(rings)?;
+        meshes.push(mesh_of_triangles(more.clone(), corners.clone())?);
         vertices.extend(more);
         triangles.extend(corners.into_iter().map(|corners| corners.map(|v| v.saturating_add(first))));
     }
+    if overlap(&meshes) {
+        return Err("has parts that overlap, whose volume would count twice: merge them (in QGIS: \"Dissolve\")");
+    }
+    mesh_of_triangles(vertices, triangles)
+}
+
+fn mesh_of_triangles(
+    vertices: Vec<Point>,
+    triangles: Vec<[u32; 3]>,
+) -> std::result::Result<TriangleMesh, &'static str> {
     TriangleMesh::new(vertices, triangles).map_err(|_| "cannot be cut into triangles: simplify its outlines")
+}
+
+/// Tells whether some parts have an area in common. What moving their corners to the lattice may have made of a common border is none.
+fn overlap(parts: &[TriangleMesh]) -> bool {
+    const ROUNDING: f64 = 1e-6;
+    let area_of = |part: &TriangleMesh| part.double_area() as f64 / 2.0;
+    let others = |k: usize| parts[..k].iter().filter(move |other| other.bounds().overlaps(&parts[k].bounds()));
+    (0..parts.len()).flat_map(|k| others(k).map(move |other| [&parts[k], other])).any(|[own, other]| {
+        let mut common = Comparison::new(0);
+        compare(own, other, 0.0, None, &mut common);
+        let least = area_of(own).min(area_of(other)) * ROUNDING;
+        common.all.area.value().is_none_or(|area| area > least)
+    })
 }
 
 type Triangles = (Vec<Point>, Vec<[u32; 3]>);
@@ -162,6 +187,20 @@ mod tests {
         let star = [[0, 0], [50, 10], [100, 0], [60, 50], [100, 100], [50, 60], [0, 100], [40, 50]];
         assert_eq!(area(&[&star]), Ok(7000));
         assert_eq!(area(&[&[[5, 5], [5, 5], [9, 9]]]), Ok(0));
+    }
+
+    #[test]
+    fn parts_may_touch_but_not_overlap() {
+        let square = |x: i64, y: i64, side: i64| {
+            let ring = vec![[x, y], [x + side, y], [x + side, y + side], [x, y + side]];
+            let (vertices, triangles) = triangulated(vec![ring]).unwrap();
+            TriangleMesh::new(vertices, triangles).unwrap()
+        };
+        let parts = |others: &[[i64; 3]]| others.iter().map(|[x, y, side]| square(*x, *y, *side)).collect::<Vec<_>>();
+        assert!(!overlap(&parts(&[[0, 0, 1000], [1000, 0, 1000], [3000, 0, 5], [0, 1000, 500]])));
+        // A part within another, and two that cross.
+        assert!(overlap(&parts(&[[0, 0, 1000], [3000, 0, 5], [200, 200, 10]])));
+        assert!(overlap(&parts(&[[0, 0, 1000], [990, 990, 1000]])));
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! One lattice for two terrains.
 
+use delaunay::geometry::Bounds;
 use lattice::Lattice;
-use overlay::{Point, REACH};
+use overlay::{Point, REACH, Rectangle};
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
 use sys::{Error, Result};
@@ -99,6 +100,21 @@ impl LatticeWay {
     pub(crate) fn point(&self, point: [i32; 3]) -> Point {
         [0, 1, 2].map(|k| self.factor[k] * i64::from(point[k]) + self.shift[k])
     }
+
+    /// Returns the smallest box of points of the terrain's lattice around a rectangle of the common one.
+    pub(crate) fn around(&self, rectangle: Rectangle) -> Bounds<2> {
+        let within = |value: i64| value.clamp(i32::MIN.into(), i32::MAX.into()) as i32;
+        let below = |k: usize, value: i64| value.div_euclid(self.factor[k]);
+        Bounds {
+            min: [0, 1].map(|k| within(below(k, rectangle.min[k] - self.shift[k]))),
+            max: [0, 1].map(|k| within(-below(k, self.shift[k] - rectangle.max[k]))),
+        }
+    }
+
+    /// Returns the height of 0 of the terrain's lattice in steps of the common one, and that of a step.
+    pub(crate) fn heights(&self) -> [f64; 2] {
+        [self.shift[2] as f64, self.factor[2] as f64]
+    }
 }
 
 /// Returns the `f64` nearest to a decimal.
@@ -144,6 +160,9 @@ mod tests {
         assert_eq!(common.ways[0], LatticeWay { factor: [10, 10, 1], shift: [0; 3] });
         assert_eq!(common.ways[1], LatticeWay { factor: [4, 4, 25], shift: [-5, -500, -700] });
         assert_eq!(common.ways[1].point([2, 0, 30]), [3, -500, 50]);
+        let rectangle = Rectangle { min: [-5, -500], max: [4, -499] };
+        assert_eq!(common.ways[1].around(rectangle), Bounds { min: [0, 0], max: [3, 1] });
+        assert_eq!(common.ways[0].around(rectangle), Bounds { min: [-1, -50], max: [1, -49] });
         assert_eq!(common.nearest_point([1000.0034, 2000.5]), Some([3, 0]));
         assert_eq!(common.nearest_point([1e30, 0.0]), None);
         assert_eq!(common.steps_of_height(0.1), 10.0);

@@ -4,8 +4,12 @@ use crate::areas::{Areas, read_areas};
 use crate::common_lattice::{CommonLattice, TOO_FINE};
 use crate::difference::{AreaDifference, Difference, Scale};
 use crate::tile_meshes::{MeshCache, TileFacts, TileMeshes};
+use crate::written::DifferenceOutput;
+use crate::written::compared::Compared;
+use crate::written::folder::{DifferenceFolder, SUMMARY};
 use overlay::{Comparison, FixedSum, Zones, compare};
 use rayon::prelude::*;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use sys::{Error, Warnings, address_space, interrupt};
@@ -33,18 +37,22 @@ pub struct DiffRequest {
     pub areas: Option<PathBuf>,
     /// About how many bytes of memory may be used.
     pub memory: u64,
+    /// Where a raster and a mesh of the difference are written; `None` for figures alone.
+    pub output: Option<DifferenceOutput>,
 }
 
-/// Compares two terrains.
+/// Compares two terrains, and writes the files of their difference if they are wanted.
 ///
 /// # Errors
 /// [`Error::Config`] if one is no output directory, their CRSs, units or vertical datums differ, or their lattices have no common step;
 /// [`Error::Input`] if something is not as a job wrote it, or the file of areas is bad; [`terrain::Error::Unfinished`]; [`Error::Memory`] if
-/// one tile alone needs more memory; [`Error::Io`]; [`Error::Interrupted`].
+/// one tile alone needs more memory; [`Error::Io`]; [`Error::Interrupted`]. [`Error::Config`] also if the folder of the output has something
+/// else in it, or its raster has too many cells.
 pub fn run(request: &DiffRequest) -> Result<Difference> {
     let memory = address_space::at_start().map_or(request.memory, |left| request.memory.min(left.bytes));
     let [before, after] = [FinishedTerrain::open(&request.before)?, FinishedTerrain::open(&request.after)?];
     let mut warnings = Warnings::default();
+    let folder = request.output.as_ref().map(|output| DifferenceFolder::at(&output.directory)).transpose()?;
     let names = [&request.before, &request.after].map(|path| path.display().to_string());
     same_system([before.system(), after.system()], names.each_ref().map(String::as_str), &mut warnings)?;
     let lattice = CommonLattice::new([before.lattice(), after.lattice()])?;
@@ -54,25 +62,58 @@ pub fn run(request: &DiffRequest) -> Result<Difference> {
     let meshes = [TileMeshes::new(&before, lattice.ways[0]), TileMeshes::new(&after, lattice.ways[1])];
     let facts = (0..before.count()).into_par_iter().map(|number| Ok(TileFacts::of(&meshes[0].read(number)?)));
     let facts = facts.collect::<sys::Result<Vec<TileFacts>>>()?;
+    let cache = MeshCache::new(&meshes[0], lanes.kept);
     let run = Run {
         meshes: &meshes,
-        cache: MeshCache::new(&meshes[0], lanes.kept),
+        cache: &cache,
         facts: &facts,
         zones: areas.as_ref().map(|areas| &areas.zones),
         threshold: lattice.steps_of_height(request.threshold),
         next: AtomicUsize::new(0),
     };
     let found = (0..lanes.count).into_par_iter().map(|_| run.compare_tiles());
-    let found = found.try_reduce(|| run.nothing(), |a, b| Ok(a.merge(b)))?;
+    let mut found = found.try_reduce(|| run.nothing(), |a, b| Ok(a.merge(b)))?;
     let area_before = facts.iter().fold(FixedSum::default(), |mut sum, facts| {
         sum.add_half(facts.double_area);
         sum
     });
     let scale = Scale::new(lattice.step_lengths(), before.system());
+    let areas_of_both = [area_before, found.area_after];
     let refuse = || Error::Config(format!("the sums are too large for 128 bits: {TOO_FINE}"));
-    difference(request, [&before, &after], &scale, [area_before, found.area_after], &found.comparison, areas, warnings)
-        .ok_or_else(refuse)
-        .map_err(Into::into)
+    let figures = difference(request, [&before, &after], &scale, areas_of_both, &found.comparison, areas, warnings);
+    let mut difference = figures.ok_or_else(refuse)?;
+    let (Some(output), Some(folder)) = (&request.output, &folder) else { return Ok(difference) };
+    found.facts.sort_unstable_by_key(|(number, _)| *number);
+    let facts_after: Vec<TileFacts> = found.facts.into_iter().map(|(_, facts)| facts).collect();
+    let compared = Compared {
+        terrains: [&before, &after],
+        lattice: &lattice,
+        facts: [&facts, &facts_after],
+        areas: areas_of_both,
+        cache: &cache,
+        lanes: lanes.count,
+        memory,
+        threshold: request.threshold,
+        greatest: found.comparison.all.max_rise.max(found.comparison.all.max_fall),
+    };
+    difference.written = Some(compared.write(output, folder, &mut difference.warnings)?);
+    write_summary(folder, &difference)?;
+    folder.publish()?;
+    Ok(difference)
+}
+
+/// Writes all figures into the folder.
+fn write_summary(folder: &DifferenceFolder, difference: &Difference) -> sys::Result<()> {
+    #[derive(Serialize)]
+    struct Summary<'a> {
+        generator: &'a str,
+        #[serde(flatten)]
+        difference: &'a Difference,
+    }
+    let generator = concat!("gdt-batch ", env!("CARGO_PKG_VERSION"));
+    let text = serde_json::to_string_pretty(&Summary { generator, difference })
+        .map_err(|error| Error::Broken(format!("the figures cannot be written as JSON: {error}")))?;
+    folder.write(SUMMARY, format!("{text}\n").as_bytes())
 }
 
 /// How many tiles may be compared at the same time, and how many meshes kept.
@@ -102,7 +143,7 @@ impl Lanes {
 struct Run<'a> {
     meshes: &'a [TileMeshes<'a>; 2],
     /// Tiles of the earlier terrain.
-    cache: MeshCache<'a>,
+    cache: &'a MeshCache<'a>,
     facts: &'a [TileFacts],
     zones: Option<&'a Zones>,
     /// In steps of height.
@@ -115,19 +156,23 @@ struct Run<'a> {
 struct Found {
     comparison: Comparison,
     area_after: FixedSum,
+    /// What is known of the tiles of the later terrain, by their numbers.
+    facts: Vec<(usize, TileFacts)>,
 }
 
 impl Found {
     fn merge(mut self, other: Found) -> Found {
         self.comparison.merge(&other.comparison);
         self.area_after.merge(other.area_after);
+        self.facts.extend(other.facts);
         self
     }
 }
 
 impl Run<'_> {
     fn nothing(&self) -> Found {
-        Found { comparison: Comparison::new(self.zones.map_or(0, Zones::count)), area_after: FixedSum::default() }
+        let comparison = Comparison::new(self.zones.map_or(0, Zones::count));
+        Found { comparison, area_after: FixedSum::default(), facts: Vec::new() }
     }
 
     /// Compares one tile of the later terrain after the other until none is left.
@@ -140,6 +185,7 @@ impl Run<'_> {
             }
             let after = self.meshes[1].read(number)?;
             found.area_after.add_half(after.double_area());
+            found.facts.push((number, TileFacts::of(&after)));
             let zones = self.zones.map(|zones| zones.of(&after));
             for (earlier, _) in self.facts.iter().enumerate().filter(|(_, tile)| tile.bounds.overlaps(&after.bounds()))
             {
@@ -188,6 +234,7 @@ fn difference(
             None => None,
             Some(all) => Some(all_of(all)?),
         },
+        written: None,
         warnings,
     })
 }

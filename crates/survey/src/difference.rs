@@ -1,5 +1,6 @@
 //! What a comparison has found, for people and programs.
 
+use crate::written::{WrittenDifference, short_name};
 use overlay::{FixedSum, Totals};
 use serde::Serialize;
 use std::fmt;
@@ -34,6 +35,8 @@ pub struct Difference {
     pub area_after_only: f64,
     /// The figures within each polygon; `None` if none were given.
     pub areas: Option<Vec<AreaDifference>>,
+    /// The files of the difference; `None` if none were wanted.
+    pub written: Option<WrittenDifference>,
     /// What the user should know.
     pub warnings: Warnings,
 }
@@ -111,12 +114,12 @@ impl Difference {
     }
 
     fn row(&self, f: &mut fmt::Formatter<'_>, name: &str, value: f64, power: usize) -> fmt::Result {
-        let sign = ["m", "m2", "m3"][power];
+        let sign = ["m", "m²", "m³"][power];
         let digits = 3;
         match self.unit_sizes() {
             None => writeln!(f, "{name:<24}{value:>22.digits$} {sign}"),
             Some(sizes) => {
-                let unit = format!("{}{}", self.unit, ["", "2", "3"][power]);
+                let unit = format!("{}{}", short_name(&self.unit), ["", "²", "³"][power]);
                 let own = value / sizes[power];
                 writeln!(f, "{name:<24}{value:>22.digits$} {sign:<4}{own:>22.digits$} {unit}")
             }
@@ -153,6 +156,7 @@ impl fmt::Display for Difference {
             writeln!(f, "\narea {} {name}", area.number)?;
             self.rows(f, &area.figures)?;
         }
+        self.written.iter().try_for_each(|written| write!(f, "{written}"))?;
         self.warnings.iter().try_for_each(|warning| writeln!(f, "warning: {warning}"))
     }
 }

@@ -32,20 +32,16 @@ pub struct ProfileRequest {
 }
 
 /// The heights along the lines of a file.
-#[derive(Clone, Debug)]
 pub struct Profile {
-    lines: Vec<ProfiledLine>,
+    lines: Vec<Line>,
+    segments: Vec<LineSegment>,
+    /// In the order of the segments, and along each.
+    found: Found,
+    lattice: FineLattice,
     /// Decimals of x, y and distances, and of heights.
     decimals: [usize; 2],
     /// What the user should know.
     pub warnings: Warnings,
-}
-
-/// A line and the places along it.
-#[derive(Clone, Debug)]
-struct ProfiledLine {
-    name: String,
-    rows: Vec<Row>,
 }
 
 /// A place on a line. Lengths are in source units.
@@ -98,7 +94,7 @@ pub fn run(request: &ProfileRequest) -> Result<Profile> {
     });
     let decimals = [terrain.lattice().resolution, terrain.lattice().resolution_z];
     let decimals = decimals.map(|step| (step.normalize().scale() + MORE_DECIMALS) as usize);
-    Ok(Profile { lines: profiled(lines, &segments, &merged(found), &lattice), decimals, warnings })
+    Ok(Profile { lines, segments, found: merged(found), lattice, decimals, warnings })
 }
 
 /// Returns the lines of a feature, or the outlines of an area.
@@ -270,24 +266,30 @@ fn merged(found: Found) -> Found {
     all
 }
 
-/// Returns the rows of all lines. What was found comes in the order of the segments.
-fn profiled(lines: Vec<Line>, segments: &[LineSegment], found: &Found, lattice: &FineLattice) -> Vec<ProfiledLine> {
-    let of_segments: Vec<&[(usize, Crossing)]> = found.chunk_by(|a, b| a.0 == b.0).collect();
-    let mut of_segments = of_segments.into_iter().peekable();
-    let mut all: Vec<ProfiledLine> =
-        lines.iter().map(|line| ProfiledLine { name: line.name.clone(), rows: Vec::new() }).collect();
-    let mut distances = vec![0.0; lines.len()];
-    for (number, segment) in segments.iter().enumerate() {
-        let crossings = of_segments.next_if(|group| group[0].0 == number).unwrap_or_default();
-        let line = &lines[segment.line];
-        let [from, to] = [line.vertices[segment.vertex], line.vertices[segment.vertex + 1]];
-        let length = ((to[0] - from[0]) * (to[0] - from[0]) + (to[1] - from[1]) * (to[1] - from[1])).sqrt();
-        let start = distances[segment.line];
-        let way = SegmentRows { ends: [from, to], start, length, lattice };
-        way.add(crossings, &mut all[segment.line].rows);
-        distances[segment.line] = start + length;
+/// Calls `visit` with the name and the rows of each line, one after the other. What was found comes in the order of the segments.
+fn each_line<E>(
+    lines: &[Line],
+    segments: &[LineSegment],
+    found: &Found,
+    lattice: &FineLattice,
+    mut visit: impl FnMut(&str, &[Row]) -> std::result::Result<(), E>,
+) -> std::result::Result<(), E> {
+    let mut of_segments = found.chunk_by(|a, b| a.0 == b.0).peekable();
+    let mut segments = segments.iter().enumerate().peekable();
+    let mut rows = Vec::new();
+    for (line_number, line) in lines.iter().enumerate() {
+        rows.clear();
+        let mut start = 0.0;
+        while let Some((number, segment)) = segments.next_if(|(_, segment)| segment.line == line_number) {
+            let crossings = of_segments.next_if(|group| group[0].0 == number).unwrap_or_default();
+            let [from, to] = [line.vertices[segment.vertex], line.vertices[segment.vertex + 1]];
+            let length = ((to[0] - from[0]) * (to[0] - from[0]) + (to[1] - from[1]) * (to[1] - from[1])).sqrt();
+            SegmentRows { ends: [from, to], start, length, lattice }.add(crossings, &mut rows);
+            start += length;
+        }
+        visit(&line.name, &rows)?;
     }
-    all
+    Ok(())
 }
 
 struct SegmentRows<'a> {
@@ -336,22 +338,31 @@ impl SegmentRows<'_> {
 }
 
 impl Profile {
-    /// Returns the profile as CSV: a title, and a row for each place.
-    pub fn to_csv(&self) -> String {
-        let mut text = String::from("line,distance,x,y,z\n");
+    /// Writes the profile as CSV, line by line: a title, and a row for each place.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_csv<E>(&self, mut out: impl FnMut(&str) -> std::result::Result<(), E>) -> std::result::Result<(), E> {
+        const PIECE: usize = 1 << 16;
         let [plane, up] = self.decimals;
-        for line in &self.lines {
-            let name = CsvText(&line.name).to_string();
-            for Row { distance, place: [x, y], height } in &line.rows {
+        let mut text = String::from("line,distance,x,y,z\n");
+        each_line(&self.lines, &self.segments, &self.found, &self.lattice, |name, rows| {
+            let name = CsvText(name).to_string();
+            for Row { distance, place: [x, y], height } in rows {
                 // Writing to a string cannot fail.
                 let _ = write!(text, "{name},{distance:.plane$},{x:.plane$},{y:.plane$},");
                 let _ = match height {
                     Some(height) => writeln!(text, "{height:.up$}"),
                     None => writeln!(text),
                 };
+                if text.len() >= PIECE {
+                    out(&text)?;
+                    text.clear();
+                }
             }
-        }
-        text
+            Ok(())
+        })?;
+        out(&text)
     }
 }
 
@@ -399,8 +410,13 @@ mod tests {
         found.sort_by(|(a, first), (b, second)| {
             a.cmp(b).then(first.part.order(second.part)).then(first.met.cmp(&second.met))
         });
-        let lines = profiled(lines, &segments, &merged(found), &lattice);
-        lines[0].rows.iter().map(|row| [row.distance, row.height.unwrap_or(f64::NAN)]).collect()
+        let mut all = Vec::new();
+        let visit = |_: &str, rows: &[Row]| {
+            all.extend(rows.iter().map(|row| [row.distance, row.height.unwrap_or(f64::NAN)]));
+            Ok::<(), ()>(())
+        };
+        each_line(&lines, &segments, &merged(found), &lattice, visit).unwrap();
+        all
     }
 
     fn text(rows: &[[f64; 2]]) -> String {

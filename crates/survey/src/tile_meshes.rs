@@ -96,10 +96,11 @@ impl Held {
 pub(crate) struct TileFacts {
     pub(crate) bounds: Rectangle,
     pub(crate) double_area: i128,
+    pub(crate) triangles: u64,
 }
 
 impl TileFacts {
     pub(crate) fn of(mesh: &TriangleMesh) -> TileFacts {
-        TileFacts { bounds: mesh.bounds(), double_area: mesh.double_area() }
+        TileFacts { bounds: mesh.bounds(), double_area: mesh.double_area(), triangles: mesh.len() as u64 }
     }
 }

@@ -5,6 +5,7 @@ use crate::source_grid::SourceGrid;
 use crate::system::TerrainSystem;
 use lattice::Lattice;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 use sys::disk;
@@ -20,6 +21,8 @@ const RUN_AGAIN: &str = "run the job again (gdt-batch verify lists what else is 
 #[derive(Clone, Debug)]
 pub struct FinishedTerrain {
     directory: PathBuf,
+    /// All files that the list names, by their paths from the directory.
+    files: BTreeMap<String, Checksum>,
     /// The tiles in the order of their names, with their checksums.
     tiles: Vec<(PathBuf, Checksum)>,
     extras: Extras,
@@ -90,7 +93,8 @@ impl FinishedTerrain {
         };
         let georeference = listed_file(&output.georeference(), directory, &files)?;
         let system = TerrainSystem::new(&extras, georeference.as_deref());
-        Ok(FinishedTerrain { directory: directory.into(), tiles, extras, grid, lattice, system })
+        let files = files.into_iter().collect();
+        Ok(FinishedTerrain { directory: directory.into(), files, tiles, extras, grid, lattice, system })
     }
 
     /// Returns the output directory.
@@ -118,6 +122,23 @@ impl FinishedTerrain {
         &self.system
     }
 
+    /// Returns the files of the terrain but its report, by their paths from the directory with slashes, in the order of their names.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        self.files.keys().map(String::as_str)
+    }
+
+    /// Reads one of [`files`](FinishedTerrain::files), and compares it with its checksum.
+    ///
+    /// # Errors
+    /// [`sys::Error::Input`] if it is not as the job wrote it, [`sys::Error::Io`].
+    pub fn read_file(&self, name: &str) -> sys::Result<Vec<u8>> {
+        let path = self.directory.join(name);
+        match self.files.get(name) {
+            Some(wanted) => read_checked(&path, *wanted, GONE),
+            None => Err(sys::Error::input(&path, format!("it is none of the results: {RUN_AGAIN}"))),
+        }
+    }
+
     /// Returns the bytes that the meshes of the largest tile take, at most.
     ///
     /// # Errors
@@ -133,13 +154,7 @@ impl FinishedTerrain {
     pub fn read_tile(&self, number: usize) -> sys::Result<Vec<LatticePart>> {
         let Some((path, wanted)) = self.tiles.get(number) else { return Ok(Vec::new()) };
         let damaged = |what: &str| sys::Error::input(path, format!("{what}: {RUN_AGAIN}"));
-        let bytes = read_file(path).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => damaged("the tile is gone"),
-            _ => sys::Error::io("read", path)(error),
-        })?;
-        if Checksum::of(&bytes) != *wanted {
-            return Err(damaged("it is not as the job wrote it, by its checksum"));
-        }
+        let bytes = read_checked(path, *wanted, "the tile is gone")?;
         let tile = read_surface_of(path, bytes)?;
         if tile.extras != self.extras {
             return Err(damaged("it comes from another job than the first tile"));
@@ -185,16 +200,22 @@ fn read_list(output: &OutputFiles, wanted: Option<Checksum>) -> Result<Vec<(Stri
 /// Reads a file that the list may have; `None` if it has not.
 fn listed_file(path: &Path, directory: &Path, files: &[(String, Checksum)]) -> Result<Option<Vec<u8>>> {
     let Some((_, wanted)) = files.iter().find(|(name, _)| directory.join(name) == path) else { return Ok(None) };
+    Ok(Some(read_checked(path, *wanted, GONE)?))
+}
+
+const GONE: &str = "the file is gone";
+
+/// Reads a file and compares it with its checksum. `gone` says that it is not there.
+fn read_checked(path: &Path, wanted: Checksum, gone: &str) -> sys::Result<Vec<u8>> {
+    let damaged = |what: &str| sys::Error::input(path, format!("{what}: {RUN_AGAIN}"));
     let bytes = read_file(path).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => sys::Error::input(path, format!("the file is gone: {RUN_AGAIN}")),
+        ErrorKind::NotFound => damaged(gone),
         _ => sys::Error::io("read", path)(error),
     })?;
-    if Checksum::of(&bytes) != *wanted {
-        return Err(
-            sys::Error::input(path, format!("it is not as the job wrote it, by its checksum: {RUN_AGAIN}")).into()
-        );
+    match Checksum::of(&bytes) == wanted {
+        true => Ok(bytes),
+        false => Err(damaged("it is not as the job wrote it, by its checksum")),
     }
-    Ok(Some(bytes))
 }
 
 fn is_lattice_of(lattice: &Lattice, extras: &Extras) -> bool {

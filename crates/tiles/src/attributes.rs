@@ -43,7 +43,7 @@ impl TryFrom<Vec<String>> for AttributeChoice {
                 INTENSITY => choice.intensity = true,
                 _ => {
                     return Err(format!(
-                        "attributes is a list of \"{CLASSIFICATION}\", \"{INTENSITY}\", both or neither; {name:?} is not known"
+                        "attributes is a list of \"{CLASSIFICATION}\", \"{INTENSITY}\", both or neither, such as [\"{INTENSITY}\"]; {name:?} is not known"
                     ));
                 }
             }

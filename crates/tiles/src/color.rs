@@ -86,6 +86,11 @@ pub fn to_srgb(linear: u16) -> u8 {
     FROM_LINEAR[linear as usize >> 4]
 }
 
+/// Returns the linear colour of an sRGB colour.
+pub fn from_srgb(bytes: [u8; 3]) -> LinearRgb {
+    bytes.map(decode_byte)
+}
+
 fn decode_byte(v: u8) -> u16 {
     TO_LINEAR[v as usize * 257]
 }

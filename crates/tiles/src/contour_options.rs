@@ -211,9 +211,14 @@ impl ContourLevels {
 
 /// Returns a power of ten, or two or five times one, that divides a height into about a hundred intervals.
 fn round_interval(span: f64) -> f64 {
+    round_up(span / 200.0)
+}
+
+/// Returns the least of 1, 2 and 5 times a power of ten that is not below `value`, from a thousand-millionth on.
+pub fn round_up(value: f64) -> f64 {
     let candidates = (-9..=9).flat_map(|power| [1, 2, 5].map(|digit| format!("{digit}e{power}")));
-    let numbers = candidates.filter_map(|text| text.parse::<f64>().ok());
-    numbers.into_iter().find(|interval| span / interval <= 200.0).unwrap_or(5e9)
+    let mut numbers = candidates.filter_map(|text| text.parse::<f64>().ok());
+    numbers.find(|number| *number >= value).unwrap_or(5e9)
 }
 
 #[cfg(test)]

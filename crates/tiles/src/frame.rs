@@ -116,6 +116,19 @@ impl Frame {
         self
     }
 
+    /// Returns the frames with all steps that a job may choose, the coarsest first: those of packed tiles, halved some times.
+    pub(crate) fn possible(&self) -> impl Iterator<Item = Frame> {
+        const MOST_HALVED: usize = 12;
+        let halved = |scale: AxisScale, times: usize| (0..times).fold(scale, |scale, _| scale.halved());
+        let [xy, up] = self.resolution_metres();
+        let all = (0..MOST_HALVED).flat_map(|flat| (0..MOST_HALVED).map(move |upward| [flat, upward]));
+        all.map(move |[flat, upward]| Frame {
+            horizontal: halved(AxisScale::packed(xy), flat),
+            vertical: halved(AxisScale::packed(up), upward),
+            ..self.clone()
+        })
+    }
+
     /// Returns how the scene follows the curve of the earth.
     pub(crate) fn curvature(&self) -> Option<&Curvature> {
         self.extras.curvature.as_ref()

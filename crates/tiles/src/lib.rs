@@ -24,6 +24,7 @@ pub mod options;
 pub mod page;
 pub mod preview;
 pub mod raster;
+pub mod rewritten;
 pub mod terrain_options;
 pub mod tile;
 pub mod tiles3d;

@@ -223,7 +223,9 @@ impl TryFrom<Vec<String>> for ExportChoice {
             let known = ExportFormat::ALL.into_iter().find(|format| format.name() == name);
             known.ok_or_else(|| {
                 let all = ExportFormat::ALL.map(|format| format!("\"{}\"", format.name()));
-                format!("export is a list of formats: {}; {name:?} is not known", all.join(", "))
+                let near = if name.eq_ignore_ascii_case("dwg") { ": programs that know DWG open \"dxf\"" } else { "" };
+                let [first, ..] = &all;
+                format!("export is a list of {}, such as [{first}], and {name:?} is none of them{near}", all.join(", "))
             })
         };
         names.into_iter().map(format).collect::<std::result::Result<_, _>>().map(ExportChoice)

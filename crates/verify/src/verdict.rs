@@ -239,10 +239,11 @@ impl Verdict {
 /// Says what is missing of the triangles that were left out of the terrain, of which `found` are there; `None` if nothing is known to be.
 fn what_is_gone_of_cut(facts: &ReportedFacts, written: &WrittenFiles, found: u64) -> Option<String> {
     if let (Some(first), true) = (written.cut_gone.first(), found > 0) {
-        let count = written.cut_gone.len();
-        return Some(format!(
-            "{count} files of cut/, which holds what hull and max_edge left out, are gone, the first of them {first}"
-        ));
+        const CUT: &str = "of cut/, which holds what hull and max_edge left out,";
+        return Some(match written.cut_gone.len() {
+            1 => format!("a file {CUT} is gone: {first}"),
+            count => format!("{count} files {CUT} are gone, the first of them {first}"),
+        });
     }
     let all = facts.cut_triangles.filter(|&count| count > 0 && found == 0);
     let gone = "triangles were left out (hull, max_edge), and the folder cut/ that should hold them is gone";

@@ -69,21 +69,18 @@ fn what_encloses_nothing_or_is_no_area_is_named() {
     let flat = vec![[40.0, 40.0], [60.0, 60.0], [80.0, 80.0]];
     let back = vec![SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[1]];
     for (rings, words) in [
-        (&[eight][..], "1 features are lakes whose outlines cross, the first is feature 1 at (500070, 4000070)"),
-        (
-            &[square.clone(), beyond],
-            "1 features are lakes whose outlines cross, the first is feature 1 at (500100, 40000",
-        ),
+        (&[eight][..], "feature 1 is a lake whose outlines cross at (500070, 4000070)"),
+        (&[square.clone(), beyond], "feature 1 is a lake whose outlines cross at (500100, 40000"),
         (
             &[square.clone(), BESIDE.to_vec()],
-            "lakes with a hole outside of their outline, the first is feature 1 at (500110, 4000040)",
+            "feature 1 is a lake with a hole outside of its outline at (500110, 4000040)",
         ),
         (
             &[[&square[..], &[[40.0, 40.0], [70.0, 40.0]], &square[1..]].concat()],
-            "lakes whose outlines enclose nothing",
+            "feature 1 is a lake whose outlines enclose nothing",
         ),
-        (&[flat], "1 features are areas whose outline encloses nothing"),
-        (&[back], "1 features are areas whose outline encloses nothing"),
+        (&[flat], "feature 1 is an area whose outline encloses nothing"),
+        (&[back], "feature 1 is an area whose outline encloses nothing"),
     ] {
         let (said, _) = run(&survey, &[rings]);
         assert!(said.code == 0 && said.out.contains(words), "{}", said.out);
@@ -107,7 +104,7 @@ fn heights_of_an_outline_that_is_run_through_twice_are_compared() {
         let features = Features::areas(&[("lake", vec![[at(5.0), at(again)].concat()])]);
         let job = survey.job_with(&[geojson(survey.folder(), "twice.geojson", &features)], "kind = \"lake\"");
         let text = job.run_with(&["check"]).succeeded().out;
-        assert_eq!(text.contains("1 lakes are not flat; the worst is feature 1 of"), is_named, "{text}");
+        assert_eq!(text.contains("1 lake is not flat; the worst is feature 1 of"), is_named, "{text}");
         assert_eq!(text.contains("which is 0.5 higher"), is_named, "{text}");
     }
 }
@@ -121,5 +118,5 @@ fn a_ring_beside_the_only_outline_is_named() {
     let features = Features::areas(&[("lake", vec![clockwise(&SQUARE), other(&BESIDE)])]);
     let job = survey.job_with(&[shapefile(survey.folder(), "lakes", &features)], "kind = \"lake\"");
     let text = job.run_with(&["check"]).succeeded().out;
-    assert!(text.contains("a hole outside of their outline"), "{text}");
+    assert!(text.contains("a hole outside of its outline"), "{text}");
 }

@@ -98,9 +98,9 @@ impl JobDirectory {
         self.job.join("map.tiles")
     }
 
-    /// Returns the paths of the files in which the numbered mesh waits for its exports: vertices and triangles.
-    pub fn exported_mesh(&self) -> [PathBuf; 2] {
-        ["exports.vertices", "exports.triangles"].map(|name| self.job.join(name))
+    /// Returns the paths of the files in which the numbered mesh waits for its exports: vertices, triangles and colours.
+    pub fn exported_mesh(&self) -> [PathBuf; 3] {
+        ["exports.vertices", "exports.triangles", "exports.colors"].map(|name| self.job.join(name))
     }
 
     /// Returns the path of the file in which the pieces of contour lines wait.

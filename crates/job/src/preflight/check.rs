@@ -10,14 +10,15 @@ use crate::plan::job_plan::{Plan, SkippedInput};
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::plan::make_plan::make_plan;
 use crate::plan::no_points::nothing_will_be_left;
+use crate::preflight::contour_estimate::{ContourEstimate, ContourSample};
 use crate::preflight::estimate;
 use crate::preflight::estimate::DiskEstimate;
 use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::preflight::kept_points::{KeptPoints, has_filter};
 use crate::preflight::selection_estimate::estimated_vertices;
-use crate::progress::number_text::{grouped, mebibytes};
+use crate::progress::number_text::{grouped, mebibytes, rough};
 use crate::publish::contours::check::check_contours;
-use crate::publish::height_offset_check::check_height_offset;
+use crate::publish::height_offset_check::{check_height_offset, unused_height_offset};
 use crate::publish::map_tiles::check::check_map_tiles;
 use crate::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::publish::raster::check::{check_raster, planned_raster};
@@ -32,7 +33,16 @@ use std::path::PathBuf;
 use std::{fmt, io};
 use sys::terminal::one_line;
 use sys::{Error, Result, ShownWarning, Warnings, address_space};
-use tiles::options::MaxError;
+use tiles::options::{ExportFormat, MaxError};
+
+/// A file with the exact mesh for other programs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ExportEstimate {
+    /// Its name.
+    pub file: String,
+    /// About how many bytes it takes.
+    pub bytes: u64,
+}
 
 /// What a job would do.
 #[derive(Clone, Debug, Serialize)]
@@ -51,6 +61,12 @@ pub struct Preflight {
     /// About how many columns and rows of the raster, if there is to be one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raster: Option<[u32; 2]>,
+    /// The files with the exact mesh for other programs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub exports: Vec<ExportEstimate>,
+    /// About how large the contour lines are, if there are to be some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contours: Option<ContourEstimate>,
     /// Edges along breaklines; `None` without any.
     pub breaklines: Option<u64>,
     /// Steps of the lattice in x and y, and in z.
@@ -131,10 +147,11 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     check_contours(&plan)?;
     check_terrain(&plan)?;
     let threads = workers(options, plan.records)?;
+    let contours = ContourSample::of(&plan)?;
     let mut preflight = if has_filter(&plan) {
-        inspect_closely(&plan, threads)?
+        inspect_closely(&plan, threads, contours.as_ref())?
     } else {
-        Preflight::of(&plan, threads, KeptPoints::by_headers(&plan))
+        Preflight::of(&plan, threads, KeptPoints::by_headers(&plan), contours.as_ref())
     };
     if let Some(why) = nothing_will_be_left(&plan)? {
         (preflight.kept, preflight.nothing_is_left) = (0, Some(why.to_string()));
@@ -144,43 +161,57 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
         preflight.vertices = vertices;
         preflight.warnings.extend(vertices.and_then(|vertices| too_many_vertices(options, vertices)));
         preflight.tiles = vertices.map_or(preflight.tiles, |vertices| estimate::tiles(&plan, KeptPoints(vertices)));
+        preflight.exports = exports(options, vertices.unwrap_or(preflight.kept));
     }
     Ok((preflight, plan))
 }
 
 /// Checks that the machine has what the job of `plan` needs. Reads a sample of the points, on the threads of the current rayon pool,
-/// only if the headers leave it in doubt.
+/// only if the headers leave it in doubt. `contours` are a sample of contour lines, if the job writes some.
 ///
 /// # Errors
 /// As [`Preflight::passes`].
-pub(crate) fn require_memory_and_disk(plan: &Plan, threads: usize) -> crate::Result<()> {
-    let mut preflight = Preflight::of(plan, threads, KeptPoints::by_headers(plan));
+pub(crate) fn require_memory_and_disk(
+    plan: &Plan,
+    threads: usize,
+    contours: Option<&ContourSample>,
+) -> crate::Result<()> {
+    let mut preflight = Preflight::of(plan, threads, KeptPoints::by_headers(plan), contours);
     let memory_is_short = preflight.memory_free.is_some_and(|free| free < preflight.memory);
     if has_filter(plan) && (preflight.disk_is_short() || memory_is_short) {
-        preflight = inspect_closely(plan, threads)?;
+        preflight = inspect_closely(plan, threads, contours)?;
     }
     preflight.passes()
 }
 
 /// Looks at as many points as it takes to know whether the disk suffices.
-fn inspect_closely(plan: &Plan, threads: usize) -> Result<Preflight> {
-    let is_short = |kept| Preflight::of(plan, threads, kept).disk_is_short();
+fn inspect_closely(plan: &Plan, threads: usize, contours: Option<&ContourSample>) -> Result<Preflight> {
+    let is_short = |kept| Preflight::of(plan, threads, kept, contours).disk_is_short();
     let kept = KeptPoints::by_sample(plan, |least, most| is_short(least) || !is_short(most))?;
-    Ok(Preflight::of(plan, threads, kept))
+    Ok(Preflight::of(plan, threads, kept, contours))
+}
+
+/// Returns the files with the exact mesh of so many points.
+fn exports(options: &JobOptions, points: u64) -> Vec<ExportEstimate> {
+    let file = |(format, bytes): (ExportFormat, u64)| ExportEstimate { file: format.file_name().into(), bytes };
+    estimate::exports(points, &options.output).map(file).collect()
 }
 
 impl Preflight {
     /// Returns what the job of `plan` would do on `threads` threads if it keeps `kept` points.
-    fn of(plan: &Plan, threads: usize, kept: KeptPoints) -> Preflight {
+    fn of(plan: &Plan, threads: usize, kept: KeptPoints, contours: Option<&ContourSample>) -> Preflight {
         let options = &plan.options;
         let resolution = plan.frame.extras().resolution;
         let surface_sample = SurfaceShares::of_kept(&plan.sample);
         let mut warnings = plan.all_warnings();
+        warnings.extend(unused_height_offset(plan));
         let of_sample = |warning: String| format!("in a sample of the points: {warning}");
         warnings.extend(no_ground(&options.input, &plan.sample).map(of_sample));
         warnings.extend(plan.sample.notes.iter().cloned().map(of_sample));
         warnings.extend(unclear_returns(&options.input, &plan.sample).map(of_sample));
-        let disk = DiskEstimate::of(plan, kept, MAX_TRIANGLES_IN_ONE_FILE);
+        let contours = contours.map(|sample| sample.estimate(kept));
+        warnings.extend(contours.as_ref().and_then(|contours| contours.warning(plan)));
+        let disk = DiskEstimate::of(plan, kept, MAX_TRIANGLES_IN_ONE_FILE, contours.as_ref());
         let describe =
             |source: &Source| (source.path.display().to_string(), format!("{:?}", source.format), source.records);
         Preflight {
@@ -190,6 +221,8 @@ impl Preflight {
             vertices: None,
             tiles: estimate::tiles(plan, kept),
             raster: planned_raster(plan).map(|grid| grid.size()),
+            exports: exports(options, kept.0),
+            contours,
             breaklines: plan.breaklines.as_ref().map(|lines| lines.findings.subsegments),
             resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
             size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),
@@ -302,6 +335,12 @@ impl fmt::Display for Preflight {
         row("tiles", format!("about {}", grouped(self.tiles)))?;
         if let Some([columns, rows]) = self.raster {
             row("raster", format!("about {} x {} cells", grouped(columns.into()), grouped(rows.into())))?;
+        }
+        for ExportEstimate { file, bytes } in &self.exports {
+            row("export", format!("{file}, about {}", mebibytes(*bytes)))?;
+        }
+        if let Some(ContourEstimate { points, bytes, .. }) = &self.contours {
+            row("contours", format!("about {} points of lines, {}", grouped(rough(*points)), mebibytes(*bytes)))?;
         }
         row("area", format!("{:.1} x {:.1} {}", self.size[0], self.size[1], self.unit))?;
         let coarser = self.longest_triangle.map_or(String::new(), |longest| {

@@ -15,6 +15,17 @@ pub fn grouped(value: u64) -> String {
     text
 }
 
+/// Returns a number with its first two digits: an estimate tells no more.
+pub fn rough(number: u64) -> u64 {
+    let unit = 10u64.pow(number.checked_ilog10().unwrap_or(0).saturating_sub(1));
+    (number + unit / 2) / unit * unit
+}
+
+/// Returns a count and what is counted, which is named in the singular.
+pub fn counted(count: u64, what: &str) -> String {
+    format!("{} {what}{}", grouped(count), if count == 1 { "" } else { "s" })
+}
+
 /// Returns an amount of bytes as whole mebibytes.
 pub fn mebibytes(bytes: u64) -> String {
     format!("{} MiB", grouped(bytes >> 20))

@@ -5,6 +5,7 @@ use crate::plan::job_plan::Plan;
 use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
 use sys::Result;
+use tiles::options::OutputFormat;
 use tiles::tiles3d::globe::NotPlaced;
 use tiles::tiles3d::ground::Ground;
 
@@ -28,4 +29,15 @@ pub(crate) fn check_height_offset(plan: &Plan) -> Result<()> {
         Err(NotPlaced::Height(error)) => Err(error),
         _ => Ok(()),
     }
+}
+
+/// Returns a warning about an offset that changes nothing, because the terrain is not placed on the globe.
+pub(crate) fn unused_height_offset(plan: &Plan) -> Option<String> {
+    let output = &plan.options.output;
+    let is_wanted = output.height_offset.is_some() && output.format != OutputFormat::Glb;
+    let why = is_wanted.then(|| globe_system(&plan.crs, plan.frame.extras().metres_per_unit).err()).flatten()?;
+    Some(format!(
+        "[output] height_offset has no effect, because the terrain is not placed on the globe: {why}; fix: set [input] crs = \
+         \"EPSG:...\", or leave [output] height_offset out"
+    ))
 }

@@ -1,6 +1,6 @@
 //! The end of a job in a few lines, for people: what was made, where it is, how exact it is, what to know, and what to do next.
 
-use crate::progress::number_text::{grouped, precise_mebibytes};
+use crate::progress::number_text::{counted, grouped, precise_mebibytes};
 use crate::report::job_report::Report;
 use crate::report::selection_report::SelectionReport;
 use crate::report::skipped_inputs::write_skipped;
@@ -119,10 +119,6 @@ fn one_or_more(count: u64, what: &str) -> String {
             .fold(what.to_string(), |what, word| what.replace(word, word.trim_end_matches('s')))
     };
     format!("{} {}", grouped(count), if count == 1 { singular() } else { what.into() })
-}
-
-fn counted(count: u64, what: &str) -> String {
-    format!("{} {what}{}", grouped(count), if count == 1 { "" } else { "s" })
 }
 
 impl fmt::Display for Summary<'_> {

@@ -1,6 +1,6 @@
 //! The report as a table of all figures, for `--verbose`. [`crate::report::summary`] has what everyone should see.
 
-use crate::progress::number_text::{grouped, precise_mebibytes};
+use crate::progress::number_text::{counted, grouped, precise_mebibytes};
 use crate::publish::map_tiles::write_map_tiles::MapTileStats;
 use crate::report::breakline_report::BreaklineReport;
 use crate::report::job_report::{Report, SlowestPart, StepSeconds};
@@ -57,7 +57,8 @@ impl fmt::Display for Report {
         row("  duplicates in x, y", grouped(self.duplicates))?;
         if let Some(BreaklineReport { findings, .. }) = &self.breaklines {
             row("  at breaklines or in lakes", grouped(self.points.at_breaklines))?;
-            let of = format!("of {} segments of {} features", grouped(findings.segments), grouped(findings.features));
+            let of =
+                format!("of {} of {}", counted(findings.segments, "segment"), counted(findings.features, "feature"));
             row("edges along breaklines", format!("{}, {of}", grouped(findings.subsegments)))?;
             let of_known = |found: u64, unknown: u64| match unknown {
                 0 => grouped(found),

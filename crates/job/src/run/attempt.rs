@@ -11,7 +11,9 @@ use crate::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::plan::make_plan::{are_there_far_points, make_plan};
 use crate::preflight::check::require_memory_and_disk;
+use crate::preflight::contour_estimate::ContourSample;
 use crate::preflight::input_places::check_inputs_are_no_results;
+use crate::preflight::kept_points::KeptPoints;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
 use crate::publish::contours::check::check_contours;
@@ -187,11 +189,14 @@ fn attempt(
     check_terrain(&plan)?;
     stage.advance(1);
     let planned = stage.finish();
-    let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan));
-    note_skipped(&plan.skipped, progress);
     let threads = workers(options, plan.records)?;
+    let contours = on_threads(threads, || ContourSample::of(&plan))?;
+    let contours_of_all = contours.as_ref().map(|sample| sample.estimate(KeptPoints::by_headers(&plan)));
+    let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan, contours_of_all.as_ref()));
+    note_skipped(&plan.skipped, progress);
+    contours_of_all.and_then(|contours| contours.warning(&plan)).iter().for_each(|warning| progress.note(warning));
     if !run.force && !is_by_tasks {
-        on_threads(threads, || require_memory_and_disk(&plan, threads))?;
+        on_threads(threads, || require_memory_and_disk(&plan, threads, contours.as_ref()))?;
     }
     check_results_are_ours(directory, options.output.page)?;
     let mut earlier = earlier;

@@ -62,13 +62,18 @@ impl LeftOut {
     }
 
     /// Returns a warning that names the place too.
-    fn warning_at(&self, why: &str, what_to_do: &str) -> Option<String> {
+    fn warning_at(&self, why: [&str; 2], what_to_do: &str) -> Option<String> {
         let [x, y] = self.place;
         self.warning(why).map(|warning| format!("{warning} at ({x}, {y}): {what_to_do}"))
     }
 
-    fn warning(&self, why: &str) -> Option<String> {
-        (self.count > 0).then(|| format!("{} features {why}, the first is feature {}", self.count, self.first))
+    /// Returns a warning about one feature, or about several: what is said of one, and of several.
+    fn warning(&self, [of_one, of_several]: [&str; 2]) -> Option<String> {
+        match self.count {
+            0 => None,
+            1 => Some(format!("feature {} {of_one}", self.first)),
+            count => Some(format!("{count} features {of_several}, the first is feature {}", self.first)),
+        }
     }
 }
 
@@ -140,33 +145,54 @@ impl<'a> FeatureCollector<'a> {
     /// Returns the features, and what there is to say about those that are left out.
     pub(super) fn finish(self) -> (Vec<LineFeature>, Warnings) {
         let mut warnings = Warnings::default();
-        warnings.extend(self.without_geometry.warning("have no geometry and are left out"));
-        warnings.extend(self.too_short.warning("are lines without two different vertices and are left out"));
-        warnings.extend(self.without_inside.warning(
+        let of = |count: &LeftOut, of_one: &str, of_several: &str| count.warning([of_one, of_several]);
+        warnings.extend(of(
+            &self.without_geometry,
+            "has no geometry and is left out",
+            "have no geometry and are left out",
+        ));
+        warnings.extend(of(
+            &self.too_short,
+            "is a line without two different vertices and is left out",
+            "are lines without two different vertices and are left out",
+        ));
+        warnings.extend(of(
+            &self.without_inside,
+            "is an area whose outline encloses nothing (it has fewer than three vertices, lies on one line, or goes back over its own way) and \
+             is left out",
             "are areas whose outline encloses nothing (it has fewer than three vertices, lies on one line, or goes back over its own way) and \
              are left out",
         ));
-        warnings
-            .extend(self.without_area.warning("have lines or points, which are left out: only polygons are an area"));
-        warnings.extend(self.without_parts.warning(
+        warnings.extend(of(
+            &self.without_area,
+            "has lines or points, which are left out: only polygons are an area",
+            "have lines or points, which are left out: only polygons are an area",
+        ));
+        warnings.extend(of(
+            &self.without_parts,
+            "has a part that is left out: a line without two different vertices, or an outline that encloses nothing",
             "have a part that is left out: a line without two different vertices, or an outline that encloses nothing",
         ));
-        warnings.extend(
-            self.of_other_kinds.warning("have a value of kind_field that kinds does not list and are left out"),
-        );
+        warnings.extend(of(
+            &self.of_other_kinds,
+            "has a value of kind_field that kinds does not list and is left out",
+            "have a value of kind_field that kinds does not list and are left out",
+        ));
         warnings.extend(self.crossing.warning_at(
-            "are lakes whose outlines cross",
+            ["is a lake whose outlines cross", "are lakes whose outlines cross"],
             "water and land alternate there; mend them (in QGIS: \"Fix geometries\") if they should not",
         ));
         warnings.extend(self.hole_outside.warning_at(
-            "are lakes with a hole outside of their outline",
+            ["is a lake with a hole outside of its outline", "are lakes with a hole outside of their outline"],
             "it is taken for water; make it a lake of its own, or remove it",
         ));
         warnings.extend(self.enclosing_nothing.warning_at(
-            "are lakes whose outlines enclose nothing",
+            ["is a lake whose outlines enclose nothing", "are lakes whose outlines enclose nothing"],
             "they go over all of their way twice, or a hole covers them, and no water is there; remove what repeats or covers them",
         ));
-        warnings.extend(self.not_looked_at.warning(
+        warnings.extend(of(
+            &self.not_looked_at,
+            "is a lake with too many edges side by side or too many holes, so that faults of its outlines are not looked for",
             "are lakes with too many edges side by side or too many holes, so that faults of their outlines are not looked for",
         ));
         (self.features, warnings)
@@ -423,9 +449,9 @@ mod tests {
             assert!(features.is_empty() && all.len() == 1 && all[0].contains("no geometry"), "{all:?}");
         }
         for (geometry, words) in [
-            (RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]]]), "lines without two different vertices"),
-            (RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]; 5]]), "lines without two different vertices"),
-            (RawGeometry::Areas(vec![vec![square()[..2].to_vec(), square()]]), "areas whose outline encloses nothing"),
+            (RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]]]), "line without two different vertices"),
+            (RawGeometry::Lines(vec![vec![[1.0, 1.0, 1.0]; 5]]), "line without two different vertices"),
+            (RawGeometry::Areas(vec![vec![square()[..2].to_vec(), square()]]), "area whose outline encloses nothing"),
         ] {
             let (features, warnings) = collect("", geometry, WantedAttributes::NONE).unwrap();
             let all: Vec<&str> = warnings.iter().collect();
@@ -446,12 +472,12 @@ mod tests {
         let all: Vec<&str> = warnings.iter().collect();
         assert_eq!((features.len(), all.len()), (1, 3));
         let starts = [
-            ("1 features have no geometry", 3),
-            ("2 features are lines without two", 1),
-            ("1 features have a part", 4),
+            "feature 3 has no geometry and is left out",
+            "2 features are lines without two different vertices and are left out, the first is feature 1",
+            "feature 4 has a part that is left out",
         ];
-        for ((start, first), text) in starts.into_iter().zip(all) {
-            assert!(text.starts_with(start) && text.ends_with(&format!("feature {first}")), "{text}");
+        for (start, text) in starts.into_iter().zip(all) {
+            assert!(text.starts_with(start), "{text}");
         }
     }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use crate::compression::Compression;
 use sys::{Error, Result, fault};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"glTF");
@@ -79,6 +80,16 @@ impl GlbFile {
     pub(crate) fn document<'a, T: Deserialize<'a>>(&'a self, path: &Path) -> Result<T> {
         serde_json::from_slice(&self.json)
             .map_err(|e| Error::input(path, format!("its JSON chunk is not one of this program: {e}")))
+    }
+
+    /// Returns how a tile of this program is packed, by the extensions that it names.
+    pub(crate) fn compression(&self) -> Compression {
+        let names = |extension: &str| memchr::memmem::find(&self.json, extension.as_bytes()).is_some();
+        match (names("EXT_meshopt_compression"), names("KHR_mesh_quantization")) {
+            (true, _) => Compression::Meshopt,
+            (false, true) => Compression::Quantized,
+            (false, false) => Compression::None,
+        }
     }
 
     /// Reads the binary chunk.

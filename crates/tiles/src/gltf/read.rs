@@ -14,6 +14,7 @@ use gltf::json::validation::Checked::Valid;
 use multiversion::multiversion;
 
 use crate::attributes::PointAttributes;
+use crate::compression::Compression;
 use crate::frame::Extras;
 use crate::gltf::check_json::{Decoded, RawDocument};
 use crate::gltf::container::GlbFile;
@@ -73,6 +74,13 @@ pub fn read_surface(path: &Path) -> Result<TileFile> {
 /// As [`read_surface`], for the `bytes` of the file at `path`.
 pub fn read_surface_of(path: &Path, bytes: Vec<u8>) -> Result<TileFile> {
     decode(path, GlbFile::in_memory(path, bytes)?, TileDocument::bare)
+}
+
+/// As [`read_tile`], for the `bytes` of the file at `path`. Also returns how it is packed.
+pub fn read_packed_tile_of(path: &Path, bytes: Vec<u8>) -> Result<(TileFile, Compression)> {
+    let file = GlbFile::in_memory(path, bytes)?;
+    let compression = file.compression();
+    Ok((decode(path, file, |document| document)?, compression))
 }
 
 fn read(path: &Path, wanted: impl FnOnce(TileDocument) -> TileDocument) -> Result<TileFile> {

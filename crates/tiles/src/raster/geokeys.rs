@@ -1,5 +1,7 @@
 //! The keys of GeoTIFF (OGC 19-008r4) that say what a raster's coordinates and heights are in.
 
+use crs::Crs;
+
 /// What the coordinates of a raster are in, as far as keys can say it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RasterSystem {
@@ -56,6 +58,22 @@ const LONGEST_TEXT: usize = 2399;
 const UNITS: [(u16, f64); 3] = [(9001, 1.0), (9002, 0.3048), (9003, 1200.0 / 3937.0)];
 
 impl RasterSystem {
+    /// Returns what keys say of a CRS whose unit of x and y has so many metres, without its heights. It is empty for an unknown CRS.
+    pub fn of_plane(crs: &Crs, metres: f64) -> RasterSystem {
+        if !crs.is_named() {
+            return RasterSystem::default();
+        }
+        // A code whose text says otherwise is not what the coordinates are in.
+        let code = crs.undisputed_code().and_then(|code| u16::try_from(code).ok());
+        RasterSystem {
+            code,
+            text: crs.wkt.clone(),
+            name: crs.name.clone(),
+            metres: Some(metres),
+            ..RasterSystem::default()
+        }
+    }
+
     /// Returns whether the keys say where the coordinates are.
     pub fn is_placed(&self) -> bool {
         self.code.is_some() || self.written_text().is_some()

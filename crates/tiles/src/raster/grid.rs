@@ -169,6 +169,17 @@ impl RasterGrid {
         RasterGrid { alignment: self.alignment, first, size, narrow: wide.narrow_for(size), wide }
     }
 
+    /// Returns the grid of the same cells over another lattice, whose points have coordinates in the same CRS.
+    ///
+    /// # Errors
+    /// A sentence that begins with a verb, if numbers have too many digits.
+    pub fn on_lattice(&self, lattice: &Lattice) -> Result<RasterGrid, String> {
+        let numbers = Integers::of(lattice, &self.alignment).ok_or_else(too_many_digits)?;
+        let wide = numbers.subunits(self.first).filter(|wide| wide.fits(self.size, WIDE_BITS));
+        let wide = wide.ok_or_else(too_many_digits)?;
+        Ok(RasterGrid { narrow: wide.narrow_for(self.size), wide, ..self.clone() })
+    }
+
     /// Returns the grid with a column and a row more on each side: its cell (1, 1) is the cell (0, 0) of this one. Slopes need the heights
     /// there; no file has these cells.
     pub fn with_margin(&self) -> RasterGrid {
@@ -521,6 +532,18 @@ pub(super) mod tests {
             grid.files(side(1 << 19)),
             [[[0, 700], [0, 20]], [[700, 1600], [0, 20]], [[0, 700], [20, 1320]], [[700, 1600], [20, 1320]]]
         );
+    }
+
+    #[test]
+    fn two_lattices_have_the_same_cells() {
+        let (coarse, fine) = (lattice("100", "-7", "0.5"), lattice("90.25", "3", "0.01"));
+        let grid = in_one_file(&coarse, "1", Bounds { min: [0, -2], max: [4, 1] }).unwrap();
+        let other = grid.on_lattice(&fine).unwrap();
+        assert_eq!((other.corner(), other.size()), (grid.corner(), grid.size()));
+        // x from 100 to 101 and y from -7.5 to -7, on both lattices.
+        let cells = grid.cells_within(Bounds { min: [0, -1], max: [2, 0] });
+        assert_eq!(other.cells_within(Bounds { min: [975, -1050], max: [1075, -1000] }), cells);
+        assert_eq!(cells, [[0, 1], [1, 2]]);
     }
 
     proptest! {

@@ -74,6 +74,12 @@ pub struct CellSize {
 }
 
 impl CellSize {
+    /// Returns the side that a user wrote; `None` if it is not positive.
+    pub fn of(written: f64) -> Option<CellSize> {
+        let exact = shortest_decimal(written).filter(|exact| *exact > Decimal::ZERO)?;
+        Some(CellSize { exact, written })
+    }
+
     /// Returns the exact decimal.
     pub fn exact(self) -> Decimal {
         self.exact
@@ -90,9 +96,8 @@ impl TryFrom<toml::Value> for CellSize {
 
     fn try_from(value: toml::Value) -> Result<CellSize, String> {
         let written = number(&value).unwrap_or_default();
-        let exact = shortest_decimal(written).filter(|exact| *exact > Decimal::ZERO);
-        let exact = exact.ok_or("resolution is the side of a cell in source units, a positive number such as 0.5")?;
-        Ok(CellSize { exact, written })
+        let what = "resolution is the side of a cell in source units, a positive number such as 0.5";
+        CellSize::of(written).ok_or_else(|| what.into())
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a user should know about breaklines.
 
+use crate::progress::number_text::{counted, grouped};
 use breaklines::{BreaklineOptions, Disagreement, FeatureId, Findings, InLake, Rise, Uneven};
 use delaunay::geometry::Site;
 use lattice::Lattice;
@@ -52,6 +53,11 @@ struct Names<'a> {
     findings: &'a Findings,
 }
 
+/// Returns a number and what is said of one, or of several.
+fn one_or_several(count: u64, [of_one, of_several]: [&str; 2]) -> String {
+    format!("{} {}", grouped(count), if count == 1 { of_one } else { of_several })
+}
+
 impl Names<'_> {
     /// Says why there are no breaklines.
     fn nothing(&self, options: &BreaklineOptions, outside: u64) -> String {
@@ -62,7 +68,8 @@ impl Names<'_> {
             "what lies in the box of the points is smaller than a step of the lattice".into()
         } else if self.findings.segments == 0 {
             format!(
-                "none of {features} features reaches into the box of the points ({outside} are far from it): look at their CRS"
+                "none of {} reaches into the box of the points ({outside} far from it): look at their CRS",
+                counted(features, "feature")
             )
         } else {
             let floor = self.length(options.floor.into());
@@ -99,8 +106,8 @@ impl Names<'_> {
 
     fn rise(&self, &Rise { id, place, steps }: &Rise) -> String {
         format!(
-            "[[breaklines]]: {} rivers rise on their way down; the worst is {}, by {} at {}; its heights are kept as they are",
-            self.findings.rising_rivers,
+            "[[breaklines]]: {} down; the worst is {}, by {} at {}; its heights are kept as they are",
+            one_or_several(self.findings.rising_rivers, ["river rises on its way", "rivers rise on their way"]),
             self.feature(id),
             self.difference(i64::from(steps)),
             self.at(place)
@@ -109,9 +116,9 @@ impl Names<'_> {
 
     fn uneven(&self, &Uneven { id, lowest, highest, place }: &Uneven) -> String {
         format!(
-            "[[breaklines]]: {} lakes are not flat; the worst is {}, which is {} higher at {} than its lowest height, {}; that is the \
+            "[[breaklines]]: {}; the worst is {}, which is {} higher at {} than its lowest height, {}; that is the \
              height of all of it",
-            self.findings.uneven_lakes,
+            one_or_several(self.findings.uneven_lakes, ["lake is not flat", "lakes are not flat"]),
             self.feature(id),
             self.difference(i64::from(highest) - i64::from(lowest)),
             self.at(place),

@@ -1,4 +1,4 @@
-//! The numbered mesh, in two files of its own until all formats are written.
+//! The numbered mesh, in files of its own until all formats are written.
 
 use exports::{MeshSource, NumberedTile};
 use std::fs::File;
@@ -10,17 +10,22 @@ use sys::{Error, Result, disk, fault};
 /// Bytes of a vertex or a triangle: three numbers.
 const ELEMENT: u64 = 12;
 
-/// A file of elements with three numbers each.
+/// Bytes of a colour.
+const COLOR: u64 = 3;
+
+/// A file of elements of the same size.
 struct StoredElements {
     path: PathBuf,
     file: File,
     bytes: u64,
+    /// Bytes of an element.
+    element: u64,
 }
 
 impl StoredElements {
-    fn create(path: PathBuf) -> Result<StoredElements> {
+    fn create(path: PathBuf, element: u64) -> Result<StoredElements> {
         let file = disk::create(&path).map_err(Error::io("create", &path))?;
-        Ok(StoredElements { path, file, bytes: 0 })
+        Ok(StoredElements { path, file, bytes: 0, element })
     }
 
     fn add(&mut self, elements: &[u8]) -> Result<()> {
@@ -30,7 +35,7 @@ impl StoredElements {
     }
 
     fn read(&self, range: &Range<u64>, elements: &mut [u8]) -> Result<()> {
-        let mut read = || read_exact_at(&self.file, elements, range.start * ELEMENT);
+        let mut read = || read_exact_at(&self.file, elements, range.start * self.element);
         fault::read("read-result").and_then(|()| read()).map_err(Error::io("read", &self.path))
     }
 
@@ -44,31 +49,44 @@ impl StoredElements {
 pub(crate) struct WaitingMesh<'a> {
     vertices: StoredElements,
     triangles: StoredElements,
+    /// `None` if no format wants colours, or tiles have none.
+    colors: Option<StoredElements>,
     /// Is told of triangles that were read.
     done: &'a (dyn Fn(u64) + Sync),
 }
 
 impl<'a> WaitingMesh<'a> {
-    /// Makes the files at these paths.
+    /// Makes the files at these paths: of vertices, triangles and, if wanted, colours.
     ///
     /// # Errors
     /// [`Error::Io`].
     pub(crate) fn create(
-        [vertices, triangles]: [PathBuf; 2],
+        [vertices, triangles, colors]: [PathBuf; 3],
+        has_colors: bool,
         done: &'a (dyn Fn(u64) + Sync),
     ) -> Result<WaitingMesh<'a>> {
         Ok(WaitingMesh {
-            vertices: StoredElements::create(vertices)?,
-            triangles: StoredElements::create(triangles)?,
+            vertices: StoredElements::create(vertices, ELEMENT)?,
+            triangles: StoredElements::create(triangles, ELEMENT)?,
+            colors: has_colors.then(|| StoredElements::create(colors, COLOR)).transpose()?,
             done,
         })
     }
 
-    /// Adds the next tile.
+    /// Tells whether vertices have colours.
+    pub(crate) fn has_colors(&self) -> bool {
+        self.colors.is_some()
+    }
+
+    /// Adds the next tile. `colors` are those of the positions that its surface was made of.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub(crate) fn add(&mut self, tile: &NumberedTile) -> Result<()> {
+    pub(crate) fn add(&mut self, tile: &NumberedTile, colors: &[[u8; 3]]) -> Result<()> {
+        if let Some(stored) = &mut self.colors {
+            let of_new: Vec<[u8; 3]> = tile.origins.iter().map(|&origin| colors[origin as usize]).collect();
+            stored.add(of_new.as_flattened())?;
+        }
         self.vertices.add(bytemuck::cast_slice(&tile.new_vertices))?;
         self.triangles.add(bytemuck::cast_slice(&tile.triangles))
     }
@@ -78,6 +96,7 @@ impl<'a> WaitingMesh<'a> {
     /// # Errors
     /// [`Error::Io`].
     pub(crate) fn remove(self) -> Result<()> {
+        self.colors.map_or(Ok(()), StoredElements::remove)?;
         self.vertices.remove()?;
         self.triangles.remove()
     }
@@ -99,5 +118,12 @@ impl MeshSource for WaitingMesh<'_> {
         self.triangles.read(&numbers, bytemuck::cast_slice_mut(&mut triangles))?;
         (self.done)(triangles.len() as u64);
         Ok(triangles)
+    }
+
+    fn colors(&self, numbers: Range<u64>) -> Result<Option<Vec<[u8; 3]>>> {
+        let Some(stored) = &self.colors else { return Ok(None) };
+        let mut colors = vec![[0; 3]; length(&numbers)];
+        stored.read(&numbers, colors.as_flattened_mut())?;
+        Ok(Some(colors))
     }
 }

@@ -5,7 +5,7 @@ use crate::durable::directory::JobDirectory;
 use crate::plan::job_plan::Plan;
 use crate::publish::exports::export_limits::too_large;
 use crate::publish::exports::waiting_mesh::WaitingMesh;
-use crate::publish::raster::tile_meshes::{TileBox, boxes, lattice_mesh};
+use crate::publish::raster::tile_meshes::{TileBox, boxes, colored_lattice_mesh, lattice_mesh};
 use crate::publish::side_files::EachTile;
 use crate::tiles::write_tile::TileStats;
 use breaklines::Breaklines;
@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sys::{Error, Result, interrupt};
 use tiles::frame::Frame;
+use tiles::gltf::read::read_tile;
 use tiles::options::ExportFormat;
 
 /// A file with the exact mesh.
@@ -104,7 +105,8 @@ impl<'a> ExportWork<'a> {
         if self.formats.is_empty() {
             return Ok((exports, Vec::new()));
         }
-        let mut source = WaitingMesh::create(directory.exported_mesh(), done)?;
+        let has_colors = self.formats.contains(&ExportFormat::Ply) && self.tiles_have_colors(directory)?;
+        let mut source = WaitingMesh::create(directory.exported_mesh(), has_colors, done)?;
         let numbers = self.number(directory, &mut source, done)?;
         let lines = self.plan.built_breaklines()?.as_deref().map(lines_of).unwrap_or_default();
         let mesh = Mesh {
@@ -138,19 +140,32 @@ impl<'a> ExportWork<'a> {
         let mut numbers = VertexNumbers::default();
         for tiles in self.tiles.chunks(rayon::current_num_threads().max(1)) {
             interrupt::check()?;
+            let has_colors = mesh.has_colors();
             let read = |tile: &TileBox| {
-                let mesh = lattice_mesh(&directory.output().tile(tile.tile.number()), self.frame)?;
-                Ok(TileSurface::new(&mesh.positions, &mesh.triangles))
+                let path = directory.output().tile(tile.tile.number());
+                let (mesh, colors) = match has_colors {
+                    true => colored_lattice_mesh(&path, self.frame)?,
+                    false => (lattice_mesh(&path, self.frame)?, Vec::new()),
+                };
+                Ok((TileSurface::new(&mesh.positions, &mesh.triangles), colors))
             };
-            let surfaces: Vec<TileSurface> = tiles.par_iter().with_max_len(1).map(read).collect::<Result<_>>()?;
-            for surface in &surfaces {
+            let surfaces: Vec<(TileSurface, Vec<[u8; 3]>)> =
+                tiles.par_iter().with_max_len(1).map(read).collect::<Result<_>>()?;
+            for (surface, colors) in &surfaces {
                 let too_many = |_| Error::Broken("a terrain to export has more vertices than triangles allow".into());
                 let tile = numbers.add(surface).map_err(too_many)?;
-                mesh.add(&tile)?;
+                mesh.add(&tile, colors)?;
                 done(tile.triangles.len() as u64);
             }
         }
         Ok(numbers)
+    }
+
+    /// Tells whether vertices have colours. All tiles of a job have some, or none has.
+    fn tiles_have_colors(&self, directory: &JobDirectory) -> Result<bool> {
+        let Some(first) = self.tiles.first() else { return Ok(false) };
+        let tile = read_tile(&directory.output().tile(first.tile.number()))?;
+        Ok(tile.parts.iter().all(|part| part.colors.is_some()))
     }
 
     fn units(&self) -> Units {

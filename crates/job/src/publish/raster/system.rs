@@ -9,19 +9,12 @@ pub(crate) fn system_of(plan: &Plan) -> RasterSystem {
     let (crs, extras) = (&plan.crs, plan.frame.extras());
     let heights = crs.vertical_system.as_ref();
     let metres_z = extras.metres_per_unit_z;
-    let system = RasterSystem {
+    RasterSystem {
         vertical_code: heights.and_then(|system| system.system_code(metres_z)).and_then(short),
         vertical_name: crs.vertical_name(),
         vertical_metres: (heights.is_some() || crs.vertical.is_some()).then_some(metres_z),
-        ..RasterSystem::default()
-    };
-    if !crs.is_named() {
-        return system;
+        ..RasterSystem::of_plane(crs, extras.metres_per_unit)
     }
-    // A code whose text says otherwise is not what the coordinates are in.
-    let code = crs.undisputed_code().and_then(short);
-    let metres = Some(extras.metres_per_unit);
-    RasterSystem { code, text: crs.wkt.clone(), name: crs.name.clone(), metres, ..system }
 }
 
 fn short(code: u32) -> Option<u16> {

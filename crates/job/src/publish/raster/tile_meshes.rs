@@ -6,8 +6,9 @@ use crate::records::TileSummary;
 use delaunay::geometry::Bounds;
 use std::path::Path;
 use sys::{Error, Result, interrupt};
+use tiles::color::to_srgb;
 use tiles::frame::Frame;
-use tiles::gltf::read::{TileFile, read_surface};
+use tiles::gltf::read::{TileFile, read_surface, read_tile};
 use tiles::raster::window::LatticeMesh;
 
 /// A tile with triangles, and the box around them.
@@ -41,9 +42,26 @@ pub(crate) fn boxes(tiles: &dyn EachTile) -> Result<Vec<TileBox>> {
 /// # Errors
 /// [`Error::Io`] or [`Error::Input`] if the file cannot be read or is damaged.
 pub(crate) fn lattice_mesh(path: &Path, frame: &Frame) -> Result<LatticeMesh> {
-    let TileFile { parts, .. } = read_surface(path)?;
+    mesh_of(&read_surface(path)?, path, frame)
+}
+
+/// As [`lattice_mesh`]. Also returns the sRGB colours of the vertices.
+///
+/// # Errors
+/// As [`lattice_mesh`]; [`Error::Input`] if vertices have no colours.
+pub(crate) fn colored_lattice_mesh(path: &Path, frame: &Frame) -> Result<(LatticeMesh, Vec<[u8; 3]>)> {
+    let file = read_tile(path)?;
+    let mut colors = Vec::new();
+    for part in &file.parts {
+        let of_part = part.colors.as_ref().ok_or_else(|| Error::input(path, "a mesh has no colours"))?;
+        colors.extend(of_part.iter().map(|[red, green, blue, _]| [*red, *green, *blue].map(to_srgb)));
+    }
+    Ok((mesh_of(&file, path, frame)?, colors))
+}
+
+fn mesh_of(TileFile { parts, .. }: &TileFile, path: &Path, frame: &Frame) -> Result<LatticeMesh> {
     let mut mesh = LatticeMesh::default();
-    for part in &parts {
+    for part in parts {
         let first = mesh.positions.len() as u32;
         for v in 0..part.positions.len() {
             let world = part.world(v);

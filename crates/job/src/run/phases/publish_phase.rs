@@ -14,6 +14,7 @@ use crate::publish::classified::{ClassifiedInputs, write_all};
 use crate::publish::contours::write_contours::{ContourStats, ContourWork};
 use crate::publish::exports::write_exports::{ExportWork, ExportedFile, Exports};
 use crate::publish::flat_tile::FlatScene;
+use crate::publish::height_offset_check::unused_height_offset;
 use crate::publish::map_tiles::write_map_tiles::{MapTileStats, MapTileWork};
 use crate::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
 use crate::publish::placement::{heights_warning, place, placement_warning};
@@ -315,6 +316,7 @@ fn publish(
             placed => placed,
         };
         warnings.extend(placement_warning(&placed));
+        warnings.extend(unused_height_offset(plan));
         if placed.is_ok() {
             warnings.extend(heights_warning(&plan.crs, output.height_offset.as_ref()));
         }

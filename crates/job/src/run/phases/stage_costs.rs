@@ -1,6 +1,7 @@
 //! What the stages of a job usually cost, for the estimate of the time left.
 
 use crate::plan::job_plan::Plan;
+use crate::preflight::contour_estimate::ContourEstimate;
 use crate::publish::map_tiles::check::planned_map_tiles;
 use crate::publish::raster::check::planned_raster;
 use points::FileFormat;
@@ -24,8 +25,11 @@ const RASTER_STORED: f64 = 60.0;
 /// The same for each pixel of map tiles of the finest zoom.
 const MAP_TILES: f64 = 130.0;
 
-/// The same for each point of contour lines: it depends on how many there are.
-const CONTOURS: f64 = 250.0;
+/// The same for each point of contour lines, for each that is drawn for CAD programs too, and for each point of the terrain where they are
+/// traced.
+const CONTOURS: f64 = 200.0;
+const DRAWN: f64 = 450.0;
+const TRACE: f64 = 50.0;
 
 /// Of terrain tiles.
 const TERRAIN: f64 = 1500.0;
@@ -39,7 +43,8 @@ fn cost_of_reading(format: FileFormat) -> f64 {
 }
 
 /// Returns the stages of the job in their order, by name, with the expected cost of each.
-pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
+/// `contours` are those that the job is expected to write.
+pub(crate) fn stage_costs(plan: &Plan, contours: Option<&ContourEstimate>) -> Vec<(&'static str, f64)> {
     let sources = plan.inputs.iter().map(|input| &input.source);
     let reading = sources.map(|source| source.records as f64 * cost_of_reading(source.format)).sum();
     let points = plan.records as f64;
@@ -52,7 +57,9 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
     };
     let ground = if plan.options.input.finds_ground() { GROUND } else { 0.0 };
     let selecting = if plan.options.output.selects() { SELECT } else { 0.0 };
-    let contours = if plan.options.output.contours.is_some() { CONTOURS } else { 0.0 };
+    let is_drawn = plan.options.output.contours.as_ref().is_some_and(|options| options.dxf);
+    let of_line_point = CONTOURS + if is_drawn { DRAWN } else { 0.0 };
+    let contours = contours.map_or(0.0, |lines| lines.points as f64 * of_line_point + points * TRACE);
     let terrain = if plan.options.output.terrain.is_some() { TERRAIN } else { 0.0 };
     vec![
         ("read", reading),
@@ -62,7 +69,7 @@ pub(crate) fn stage_costs(plan: &Plan) -> Vec<(&'static str, f64)> {
         ("raster", raster),
         ("map tiles", map_tiles),
         ("export", points * exports),
-        ("contours", points * contours),
+        ("contours", contours),
         ("terrain", points * terrain),
         ("publish", points * PUBLISH),
     ]

@@ -9,6 +9,7 @@ use crate::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::plan::job_plan::Plan;
 use crate::plan::make_plan::make_plan;
 use crate::preflight::check::require_memory_and_disk;
+use crate::preflight::contour_estimate::ContourSample;
 use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
@@ -66,7 +67,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
     let threads = workers(options, plan.records)?;
     if !run.force {
-        on_threads(threads, || require_memory_and_disk(&plan, threads))?;
+        on_threads(threads, || require_memory_and_disk(&plan, threads, ContourSample::of(&plan)?.as_ref()))?;
     }
     if Parts::of(&plan).all().len() == 1 {
         single_process::leave_note(directory, submission)?;
