@@ -25,7 +25,6 @@ pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
     let area_of = |triangle: &[u32; 3]| double_area(triangle.map(|v| nodes[v as usize]));
     // Triangles that rounding has turned over have negative areas, so that the sum is that of the terrain.
     let area: i64 = all.iter().map(area_of).sum();
-    let around = if area == WHOLE { Vec::new() } else { ends(&all) };
     let (mut kept, is_unfolded) = unfolded(&nodes, all);
     if kept.is_empty() {
         return None;
@@ -33,7 +32,8 @@ pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
     if !is_unfolded || !has_all_on_border(&nodes, &kept) {
         kept = planar(&nodes, &kept);
     } else if area != WHOLE {
-        let inner: Vec<[u32; 2]> = ends(&kept).into_iter().filter(|edge| !is_on_side(&nodes, *edge)).collect();
+        let around = ends(&kept);
+        let inner: Vec<[u32; 2]> = around.iter().copied().filter(|edge| !is_on_side(&nodes, *edge)).collect();
         kept.extend(fill(&nodes, &inner, &around));
     }
     Some(without_unused(nodes, &kept))

@@ -40,7 +40,7 @@ const FIRST_FLAT_ZOOM: u8 = 10;
 pub fn coarser(tile: Tile, children: &[Child], outside: i32) -> Result<(TileMesh, u64), delaunay::Error> {
     let candidates = candidates(children);
     let (on_border, inside): (Vec<Node>, Vec<Node>) = candidates.into_iter().partition(|node| node.is_on_border());
-    let mut fixed = border(&on_border, tile.zoom);
+    let mut fixed = border(&on_border, tile.zoom, outside);
     fixed.extend(grid(&inside, &fixed, tile.zoom));
     fixed.sort_unstable_by_key(|node| node.order());
     fixed.dedup_by_key(|node| node.order());
@@ -54,7 +54,7 @@ pub fn flat(tile: Tile) -> Result<TileMesh, delaunay::Error> {
     coarser(tile, &[], 0).map(|(mesh, _)| mesh)
 }
 
-/// Returns the vertices of the terrain in all children as a tile of the zoom before has them, in order. Of those that come together the highest stays.
+/// Returns the vertices of all children as a tile of the zoom before has them, in order. Of those that come together the highest of the terrain stays.
 fn candidates(children: &[Child]) -> Vec<Node> {
     let mut all = Vec::new();
     for child in children {
@@ -64,8 +64,7 @@ fn candidates(children: &[Child]) -> Vec<Node> {
             // Only what lies on the border comes to lie on it.
             if doubled == 0 || doubled == 2 * u32::from(LAST) { halved } else { halved.clamp(1, LAST - 1) }
         };
-        let ground = child.nodes.iter().filter(|node| node.h != OUTSIDE);
-        all.extend(ground.map(|node| Node {
+        all.extend(child.nodes.iter().map(|node| Node {
             u: along(node.u, child.quadrant[0]),
             v: along(node.v, child.quadrant[1]),
             h: node.h,
@@ -77,7 +76,7 @@ fn candidates(children: &[Child]) -> Vec<Node> {
 }
 
 /// Returns the vertices along the sides: selected ones of `on_border`, and the corners.
-fn border(on_border: &[Node], zoom: u8) -> Vec<Node> {
+fn border(on_border: &[Node], zoom: u8, outside: i32) -> Vec<Node> {
     let mut border: Vec<Node> = Vec::new();
     for corner in 0..4 {
         let [u, v] = corner_place(corner);
@@ -92,7 +91,7 @@ fn border(on_border: &[Node], zoom: u8) -> Vec<Node> {
         };
         let mut of_side: Vec<(u16, Node)> = on_border.iter().filter_map(along).collect();
         of_side.sort_unstable();
-        border.extend(selected_along(&of_side, zoom));
+        border.extend(selected_along(&of_side, zoom, outside));
         let lines = grid_lines(zoom);
         for line in lines.windows(3) {
             let is_empty = !of_side.iter().any(|(along, _)| (line[0]..=line[2]).contains(along));
@@ -109,8 +108,8 @@ fn grid_lines(zoom: u8) -> Vec<u16> {
     (0..=count).map(|line| (line * u32::from(LAST) / count) as u16).collect()
 }
 
-/// Returns vertices for the curve of the earth: of each cell of the grid one of the terrain, or where four cells without any meet, one
-/// beside the terrain.
+/// Returns vertices for the curve of the earth: of each cell of the grid one of those that may be selected, or where four cells without any meet,
+/// one beside the terrain.
 fn grid(inside: &[Node], border: &[Node], zoom: u8) -> Vec<Node> {
     let lines = grid_lines(zoom);
     if lines.len() < 3 {
@@ -167,10 +166,12 @@ impl TileSource<'_> {
         if self.inside.len() as u64 <= MOST_VERTICES {
             return None;
         }
-        let cells = Cells::new(self.inside);
+        let (beside, ground): (Vec<Node>, Vec<Node>) = self.inside.iter().partition(|node| node.h == OUTSIDE);
+        let cells = Cells::new(&ground);
         let is_rough = cells.off_plane(2 * steps(self.tile.zoom)) as u64 > MOST_VERTICES / 2;
         is_rough.then(|| {
             let mut medians = cells.medians();
+            medians.extend(beside);
             medians.retain(|node| !self.is_fixed(node));
             medians.extend(self.fixed);
             medians
@@ -204,7 +205,9 @@ impl TileSource<'_> {
         let mesh = canonical(&sites)?;
         let triangles = in_order(nodes.len(), mesh.corners());
         // Heights beside the terrain are again those of the surroundings, whatever these are at the next zoom.
-        let outside: Vec<u32> = self.fixed.iter().filter(|node| node.h == OUTSIDE).map(|node| node.order()).collect();
+        let all = self.fixed.iter().chain(self.inside);
+        let mut outside: Vec<u32> = all.filter(|node| node.h == OUTSIDE).map(|node| node.order()).collect();
+        outside.sort_unstable();
         nodes.iter_mut().filter(|node| outside.binary_search(&node.order()).is_ok()).for_each(|node| node.h = OUTSIDE);
         Ok(TileMesh { nodes, triangles })
     }
