@@ -71,6 +71,17 @@ pub struct TileMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl TileMesh {
+    /// Returns the mesh of a tile that lies beside the terrain.
+    pub fn surroundings() -> TileMesh {
+        let corner = |corner: usize| {
+            let [u, v] = corner_place(corner);
+            Node { u, v, h: OUTSIDE }
+        };
+        TileMesh { nodes: (0..4).map(corner).collect(), triangles: vec![[0, 1, 3], [0, 3, 2]] }
+    }
+}
+
 /// Returns twice the area of a triangle in square steps, negative if it is clockwise.
 pub(crate) fn double_area([a, b, c]: [Node; 3]) -> i64 {
     let from_a = |p: Node| [i64::from(p.u) - i64::from(a.u), i64::from(p.v) - i64::from(a.v)];

@@ -308,6 +308,7 @@ fn neighbours_have_the_same_normals() {
 
 #[test]
 fn a_tile_beside_the_terrain_follows_the_curve_of_the_earth() {
+    check_whole(&TileMesh::surroundings());
     let mesh = flat(Tile { zoom: 0, x: 1, y: 0 }).unwrap();
     check_whole(&mesh);
     assert_eq!(mesh.nodes.len(), 33 * 33);

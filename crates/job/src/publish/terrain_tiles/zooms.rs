@@ -7,7 +7,7 @@ use quantized_mesh::{
     border_normals, coarser, encode, flat,
 };
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use sys::{Error, Result, interrupt};
 use tiles::gzip::gzipped;
 
@@ -66,7 +66,25 @@ impl Zoom {
         });
         let tiles = made.collect::<Result<Vec<Option<WaitingTile>>>>()?.into_iter().flatten().collect();
         pieces.discard()?;
-        Ok(Zoom { zoom, tiles, file })
+        let mut finest = Zoom { zoom, tiles, file };
+        finest.surround()?;
+        Ok(finest)
+    }
+
+    /// Adds tiles beside the terrain around those at its edge. Viewers would show parts of coarser tiles there, which do not quite meet the edge.
+    fn surround(&mut self) -> Result<()> {
+        let known: HashSet<Tile> = self.tiles.iter().map(|tile| tile.tile).collect();
+        let at_edge = self.tiles.iter().filter(|tile| tile.has_surroundings);
+        let around = at_edge.flat_map(|tile| offsets().map(|offset| tile.tile.beside(offset)));
+        let rows = 0..1 << self.zoom;
+        let mut missing: Vec<Tile> = around.filter(|tile| !known.contains(tile) && rows.contains(&tile.y)).collect();
+        missing.sort_unstable();
+        missing.dedup();
+        let mesh = TileMesh::surroundings();
+        for tile in missing {
+            self.tiles.push(WaitingTile::add(&self.file, tile, &mesh, 0)?);
+        }
+        Ok(())
     }
 
     /// Returns the tiles of the zoom before. At zoom 0 both are there, because viewers want both. `surroundings` is the height beside the terrain.
@@ -160,10 +178,8 @@ impl Zoom {
     /// Returns the borders of the tiles around one.
     fn around(&self, tile: Tile, places: &HashMap<Tile, u64>) -> Result<Vec<([i32; 2], Vec<BorderNormal>)>> {
         let mut around = Vec::new();
-        for offset in (-1..=1).flat_map(|north| (-1..=1).map(move |east| [east, north])) {
-            if offset != [0, 0]
-                && let Some(at) = places.get(&tile.beside(offset))
-            {
+        for offset in offsets() {
+            if let Some(at) = places.get(&tile.beside(offset)) {
                 around.push((offset, self.file.border(*at)?));
             }
         }
@@ -201,6 +217,11 @@ fn edge_of(mesh: &TileMesh) -> [i64; 2] {
     edge.dedup();
     let heights = edge.into_iter().map(height).filter(|h| *h != OUTSIDE);
     heights.fold([0, 0], |[sum, count], h| [sum + i64::from(h), count + 1])
+}
+
+/// Returns where the tiles around one are: so many columns east and rows north.
+fn offsets() -> impl Iterator<Item = [i32; 2]> {
+    (-1..=1).flat_map(|north| (-1..=1).map(move |east| [east, north])).filter(|offset| *offset != [0, 0])
 }
 
 /// What lies beside the terrain: a plain at the height of its edge, and the ellipsoid where tiles are so coarse that this makes no difference.
