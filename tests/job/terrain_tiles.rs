@@ -46,7 +46,7 @@ fn tiles(files: &BTreeMap<String, Vec<u8>>) -> BTreeMap<[i64; 3], DecodedTile> {
 
 /// The vertices of a side: where along it, and at which height.
 fn side(tile: &DecodedTile, side: usize) -> Vec<(u16, f64)> {
-    let along = if side % 2 == 0 { 1 } else { 0 };
+    let along = if side.is_multiple_of(2) { 1 } else { 0 };
     tile.sides[side].iter().map(|&v| (tile.vertices[v as usize][along], tile.height(v as usize))).collect()
 }
 

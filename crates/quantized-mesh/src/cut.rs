@@ -249,7 +249,7 @@ impl Clip {
                 ((from - i128::from(bound)) * whole + (to - from) * part).signum() as i8
             }
         };
-        if side % 2 == 0 { sign } else { -sign }
+        if side.is_multiple_of(2) { sign } else { -sign }
     }
 
     /// Returns the ends of an edge in order, and how far along it the line of a side crosses: a fraction.

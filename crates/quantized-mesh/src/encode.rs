@@ -166,14 +166,9 @@ fn push_differences(bytes: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
 
 /// Adds the vertices along the west, south, east and north side, each list in the direction of its axis.
 fn push_sides(bytes: &mut Vec<u8>, nodes: &[Node], is_long: bool) {
-    let sides: [fn(&Node) -> (bool, u16); 4] = [
-        |node| (node.u == 0, node.v),
-        |node| (node.v == 0, node.u),
-        |node| (node.u == LAST, node.v),
-        |node| (node.v == LAST, node.u),
-    ];
-    for side in sides {
-        let along = (0u32..).zip(nodes).filter(|(_, node)| side(node).0).map(|(v, node)| (side(node).1, v));
+    for (axis, end) in [(0, 0), (1, 0), (0, LAST), (1, LAST)] {
+        let place = |node: &Node| if axis == 0 { [node.u, node.v] } else { [node.v, node.u] };
+        let along = (0u32..).zip(nodes).filter(|(_, node)| place(node)[0] == end).map(|(v, node)| (place(node)[1], v));
         let mut along: Vec<(u16, u32)> = along.collect();
         along.sort_unstable();
         bytes.extend((along.len() as u32).to_le_bytes());

@@ -33,10 +33,10 @@ impl Header {
         let radius = all.map(|place| length(minus(place, centre))).fold(0.0, f64::max);
         let direction = scaled(centre);
         let direction = direction.map(|along| along / length(direction));
-        let reach = places().map(|place| horizon_distance(scaled(earth_centred(place, high)), direction));
+        let mut reach = places().map(|place| horizon_distance(scaled(earth_centred(place, high)), direction));
         // A tile around which the horizon turns is never hidden by it.
         const FAR: f64 = 10.0;
-        let reach = reach.fold(Some(1.0), |most: Option<f64>, reach| Some(most?.max(reach?))).unwrap_or(FAR);
+        let reach = reach.try_fold(1.0, |most: f64, reach| Some(most.max(reach?))).unwrap_or(FAR);
         Header { centre, radius, horizon: direction.map(|along| along * reach) }
     }
 }

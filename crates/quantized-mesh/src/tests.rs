@@ -91,7 +91,7 @@ fn check_whole(mesh: &TileMesh) {
 
 /// The vertices of a side: steps along it, and heights.
 fn side(mesh: &TileMesh, side: usize) -> Vec<[i32; 2]> {
-    let end = if side % 2 == 0 { 0 } else { LAST };
+    let end = if side.is_multiple_of(2) { 0 } else { LAST };
     let along = |node: &Node| match side < 2 {
         true => (node.u == end).then_some([i32::from(node.v), node.h]),
         false => (node.v == end).then_some([i32::from(node.u), node.h]),

@@ -5,7 +5,7 @@ use crate::report::job_report::Report;
 use crate::report::selection_report::SelectionReport;
 use crate::report::skipped_inputs::write_skipped;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use sys::ShownWarning;
 use sys::terminal::name;
 use tiles::file_names::OutputFiles;
@@ -92,7 +92,8 @@ impl<'a> Summary<'a> {
         paths.push(output.terrain_layer());
         paths.push(output.classified().0);
         let there = paths.into_iter().filter(|path| path.exists());
-        let files: Vec<String> = there.filter_map(|path: PathBuf| Some(name(Path::new(path.file_name()?)))).collect();
+        let own = |path: PathBuf| Some(name(path.strip_prefix(output.directory()).ok()?));
+        let files: Vec<String> = there.filter_map(own).collect();
         let without = match self.output.format == OutputFormat::Auto && !output.terrain().exists() {
             true => " (terrain.glb is left out: one file would be too large for viewers)",
             false => "",

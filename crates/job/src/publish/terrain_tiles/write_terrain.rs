@@ -14,6 +14,8 @@ use delaunay::geometry::predicates::orient2d;
 use quantized_mesh::{HEIGHT_STEPS, LayerAbout, Tile, ZoomTiles, cut, finest_zoom, layer};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use sys::{Error, Result, interrupt};
 use tiles::frame::Frame;
@@ -52,6 +54,28 @@ pub(crate) struct TerrainWork<'a> {
     frame: &'a Frame,
     tiles: Vec<TileBox>,
     globe: Globe,
+}
+
+/// The zooms take as long as so many readings of the tiles.
+const STEPS_OF_ZOOMS: u64 = 8;
+
+/// The steps of the zooms.
+struct ZoomSteps<'a> {
+    done: &'a (dyn Fn(u64) + Sync),
+    /// All steps, and the tiles that they are divided among.
+    steps: u64,
+    tiles: u64,
+    /// The tiles so far.
+    finished: AtomicU64,
+}
+
+impl ZoomSteps<'_> {
+    fn finish_tile(&self) {
+        let before = self.finished.fetch_add(1, Ordering::Relaxed).min(self.tiles);
+        let steps = |tiles: u64| self.steps * tiles / self.tiles.max(1);
+        let after = (before + 1).min(self.tiles);
+        (self.done)(steps(after) - steps(before));
+    }
 }
 
 /// What the tiles of a job have in common.
@@ -98,9 +122,9 @@ impl<'a> TerrainWork<'a> {
         Ok(Some(TerrainWork { plan, frame, tiles: boxes(tiles)?, globe: globe_of(plan)? }))
     }
 
-    /// Returns about the number of steps: tiles to measure and to cut.
+    /// Returns the number of steps. For each tile there is one to measure it, one to cut it, and what the zooms take together is divided into others.
     pub(crate) fn steps(&self) -> u64 {
-        2 * self.tiles.len() as u64
+        (2 + STEPS_OF_ZOOMS) * self.tiles.len() as u64
     }
 
     /// Writes the tiles from those of the job, which must have their names. Calls `done` for each of the [steps](TerrainWork::steps).
@@ -123,18 +147,27 @@ impl<'a> TerrainWork<'a> {
         let area = measured.double_area as f64 / 2.0 * area_of_step.abs();
         let zoom = finest_zoom(area, measured.triangles / 2, place.latitude);
         let (pieces, list) = self.cut(directory, &grid(zoom), area_of_step < 0.0, done)?;
-        let mut finest = Zoom::finest(zoom, directory, pieces, list, &|_| ())?;
+        // Each tile is joined or selected, and written. The coarser zooms have a third as many as the finest.
+        let finest_tiles = list.iter().map(|(tile, _)| tile).collect::<HashSet<_>>().len() as u64;
+        let steps = ZoomSteps {
+            done,
+            steps: STEPS_OF_ZOOMS * self.tiles.len() as u64,
+            tiles: finest_tiles * 8 / 3,
+            finished: AtomicU64::new(0),
+        };
+        let finish_tile = &|| steps.finish_tile();
+        let mut finest = Zoom::finest(zoom, directory, pieces, list, finish_tile)?;
         let surroundings = Surroundings { height: finest.mean_edge() };
         let mut pyramid =
             Pyramid { directory, surroundings, stats: TerrainStats::default(), files: Vec::new(), zooms: Vec::new() };
         pyramid.stats.surroundings = f64::from(surroundings.height) / HEIGHT_STEPS;
         let degrees = degrees_of(&finest.tiles.iter().map(|tile| tile.tile).collect::<Vec<Tile>>());
         while finest.zoom > 0 {
-            let coarser = finest.coarser(directory, surroundings, &|_| ())?;
-            pyramid.write(finest)?;
+            let coarser = finest.coarser(directory, surroundings, finish_tile)?;
+            pyramid.write(finest, finish_tile)?;
             finest = coarser;
         }
-        pyramid.write(finest)?;
+        pyramid.write(finest, finish_tile)?;
         let about = LayerAbout { bounds: degrees, attribution: self.plan.options.output.copyright() };
         pyramid.finish(&about)
     }
@@ -188,11 +221,13 @@ struct Pyramid<'a> {
 
 impl Pyramid<'_> {
     /// Writes the tiles of a zoom.
-    fn write(&mut self, zoom: Zoom) -> Result<()> {
+    fn write(&mut self, zoom: Zoom, finish_tile: &(dyn Fn() + Sync)) -> Result<()> {
         let write = |tile: Tile, bytes: Vec<u8>| {
             let path = self.directory.output().terrain_tile(tile.zoom, [tile.column(), tile.y]);
             create_folder_of(&path)?;
-            write_pending(&path, &bytes)
+            let written = write_pending(&path, &bytes);
+            finish_tile();
+            written
         };
         self.files.extend(zoom.encode(self.surroundings, &write)?);
         let tiles: Vec<Tile> = zoom.tiles.iter().map(|tile| tile.tile).collect();

@@ -52,7 +52,7 @@ impl Zoom {
         directory: &JobDirectory,
         pieces: WaitingFile,
         mut list: Vec<WaitingPiece>,
-        done: &(dyn Fn(u64) + Sync),
+        finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         list.sort_unstable();
         let file = WaitingFile::create(directory.terrain_meshes(zoom))?;
@@ -61,7 +61,7 @@ impl Zoom {
             interrupt::check()?;
             let of_tile = group.iter().map(|(_, at)| pieces.piece(*at)).collect::<Result<Vec<_>>>()?;
             let made = assemble(&of_tile).map(|mesh| WaitingTile::add(&file, group[0].0, &mesh, 0));
-            done(1);
+            finish_tile();
             made.transpose()
         });
         let tiles = made.collect::<Result<Vec<Option<WaitingTile>>>>()?.into_iter().flatten().collect();
@@ -95,7 +95,7 @@ impl Zoom {
         &self,
         directory: &JobDirectory,
         surroundings: Surroundings,
-        done: &(dyn Fn(u64) + Sync),
+        finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         let zoom = self.zoom.saturating_sub(1);
         let file = WaitingFile::create(directory.terrain_meshes(zoom))?;
@@ -106,7 +106,7 @@ impl Zoom {
         let made = groups.par_iter().with_max_len(1).map(|group| {
             interrupt::check()?;
             let made = self.above(group, &file, surroundings.at(zoom));
-            done(1);
+            finish_tile();
             made
         });
         let mut tiles: Vec<WaitingTile> = made.collect::<Result<_>>()?;
