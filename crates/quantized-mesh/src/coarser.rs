@@ -84,7 +84,7 @@ fn border(on_border: &[Node], zoom: u8, outside: i32) -> Vec<Node> {
         border.push(Node { u, v, h: known.map_or(OUTSIDE, |node| node.h) });
     }
     for side in 0..4 {
-        let end = if side.is_multiple_of(2) { 0 } else { LAST };
+        let end = if side % 2 == 0 { 0 } else { LAST };
         let along = |node: &Node| {
             let (across, along) = if side < 2 { (node.u, node.v) } else { (node.v, node.u) };
             (across == end).then_some((along, *node))
