@@ -11,7 +11,7 @@ pub const LEVEL_ZERO_ERROR: f64 = 77_067.339_6;
 const SHARE: f64 = 0.25;
 
 /// Returns the bound that the vertices of a zoom are selected by, in steps of height.
-pub(crate) fn steps(zoom: u8) -> u64 {
+pub fn steps(zoom: u8) -> u64 {
     (LEVEL_ZERO_ERROR * SHARE * HEIGHT_STEPS) as u64 >> zoom
 }
 
@@ -21,7 +21,10 @@ const VERTICES_PER_TILE: f64 = 16_384.0;
 /// The metres along a meridian, in about.
 const HALF_MERIDIAN: f64 = 20_003_931.0;
 
-/// Returns the coarsest zoom whose tiles have no more than some 16,000 vertices on average, at a latitude in radians. `area` is that of the terrain in
+/// Tiles of smaller zooms have vertices at least in a grid, so that they follow the curve of the earth. All finest tiles are flat enough without.
+pub(crate) const FIRST_FLAT_ZOOM: u8 = 10;
+
+/// Returns the coarsest zoom from 10 on whose tiles have no more than some 16,000 vertices on average, at a latitude in radians. `area` is that of the terrain in
 /// square metres, with so many vertices.
 pub fn finest_zoom(area: f64, vertices: u64, latitude: f64) -> u8 {
     let per_vertex = area / vertices.max(1) as f64;
@@ -29,5 +32,5 @@ pub fn finest_zoom(area: f64, vertices: u64, latitude: f64) -> u8 {
         let side = HALF_MERIDIAN / f64::from(1u32 << zoom);
         side * side * libm::cos(latitude) <= per_vertex * VERTICES_PER_TILE
     };
-    (1..MOST_ZOOM).find(fits).unwrap_or(MOST_ZOOM)
+    (FIRST_FLAT_ZOOM..MOST_ZOOM).find(fits).unwrap_or(MOST_ZOOM)
 }

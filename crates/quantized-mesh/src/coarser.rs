@@ -3,7 +3,7 @@
 //! Its vertices are selected from theirs ([`selection`]), those of its sides from those of their sides alone. So a tile needs no neighbour, and meets
 //! all of them.
 
-use crate::bound::steps;
+use crate::bound::{FIRST_FLAT_ZOOM, steps};
 use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, in_order};
 use crate::rough::Cells;
 use crate::side::selected_along;
@@ -28,9 +28,6 @@ const MOST_VERTICES: u64 = 16_384;
 
 /// The steps of the sides of a square that stand for one metre, or for as much in the other direction.
 const SCALE: i32 = 1024;
-
-/// Tiles of smaller zooms have vertices at least in a grid, so that they follow the curve of the earth.
-const FIRST_FLAT_ZOOM: u8 = 10;
 
 /// Returns the mesh of a tile from the tiles of the next finer zoom in it, and the bound by which its vertices were selected. `outside` is the height of
 /// the surroundings at its zoom.
@@ -89,17 +86,41 @@ fn border(on_border: &[Node], zoom: u8, outside: i32) -> Vec<Node> {
             let (across, along) = if side < 2 { (node.u, node.v) } else { (node.v, node.u) };
             (across == end).then_some((along, *node))
         };
-        let mut of_side: Vec<(u16, Node)> = on_border.iter().filter_map(along).collect();
-        of_side.sort_unstable();
-        border.extend(selected_along(&of_side, zoom, outside));
-        let lines = grid_lines(zoom);
-        for line in lines.windows(3) {
-            let is_empty = !of_side.iter().any(|(along, _)| (line[0]..=line[2]).contains(along));
-            let place = if side < 2 { [end, line[1]] } else { [line[1], end] };
-            border.extend(is_empty.then_some(Node { u: place[0], v: place[1], h: OUTSIDE }));
-        }
+        // Its corners are in it whether they are known or not, so that it is the same line in both tiles.
+        let ends = border[..4].iter().filter_map(along).collect::<Vec<_>>();
+        let mut of_side: Vec<(u16, Node)> =
+            on_border.iter().filter(|node| node.corner().is_none()).filter_map(along).collect();
+        of_side.extend(ends);
+        of_side.sort_unstable_by_key(|(along, _)| *along);
+        let selected = selected_along(&of_side, zoom, outside);
+        border.extend(on_grid(&selected, zoom, outside).into_iter().map(|(along, h)| {
+            let [u, v] = if side < 2 { [end, along] } else { [along, end] };
+            Node { u, v, h }
+        }));
+        border.extend(selected.into_iter().map(|(_, node)| node));
     }
     border
+}
+
+/// Returns vertices where the lines of the grid of a zoom meet a side, on the straight lines between selected ones: steps along the side, and
+/// heights.
+fn on_grid(selected: &[(u16, Node)], zoom: u8, outside: i32) -> Vec<(u16, i32)> {
+    let lines = grid_lines(zoom);
+    let inner = lines.get(1..lines.len() - 1).unwrap_or_default();
+    let height = |&line: &u16| {
+        let after = selected.partition_point(|(along, _)| *along < line);
+        let ((to, last), (from, first)) = (selected.get(after)?, selected.get(after.checked_sub(1)?)?);
+        if *to == line {
+            return None;
+        }
+        if [first.h, last.h] == [OUTSIDE; 2] {
+            return Some((line, OUTSIDE));
+        }
+        let [first, last] = [first, last].map(|node| i64::from(node.height(outside)));
+        let (part, whole) = (i64::from(line - from), i64::from(to - from));
+        Some((line, (first + (2 * (last - first) * part + whole).div_euclid(2 * whole)) as i32))
+    };
+    inner.iter().filter_map(height).collect()
 }
 
 /// Returns where the lines of the grid of a zoom are, with both ends.

@@ -6,7 +6,7 @@ use crate::mesh::Node;
 /// Selects vertices of a side, given in order with their steps along it, so that all are within the bound of the zoom of the
 /// lines between them (Ramer 1972; Douglas and Peucker 1973, with vertical distances). The first and the last are selected. The result depends on the
 /// side alone, so it is the same in both tiles beside it.
-pub(crate) fn selected_along(side: &[(u16, Node)], zoom: u8, outside: i32) -> Vec<Node> {
+pub(crate) fn selected_along(side: &[(u16, Node)], zoom: u8, outside: i32) -> Vec<(u16, Node)> {
     let line: Vec<[i128; 2]> =
         side.iter().map(|(along, node)| [(*along).into(), node.height(outside).into()]).collect();
     let mut is_selected = vec![false; side.len()];
@@ -22,7 +22,7 @@ pub(crate) fn selected_along(side: &[(u16, Node)], zoom: u8, outside: i32) -> Ve
             ranges.extend([(first, worst), (worst, last)]);
         }
     }
-    side.iter().zip(is_selected).filter(|(_, selected)| *selected).map(|((_, node), _)| *node).collect()
+    side.iter().zip(is_selected).filter(|(_, selected)| *selected).map(|(vertex, _)| *vertex).collect()
 }
 
 /// Returns the vertex between two that is farthest from the line between them, if it is farther than the bound.

@@ -315,6 +315,17 @@ fn a_tile_beside_the_terrain_follows_the_curve_of_the_earth() {
     assert!(mesh.nodes.iter().all(|node| node.h == OUTSIDE));
 }
 
+/// Far from the terrain, both halves of the globe have the same vertices between them, close enough for its curve.
+#[test]
+fn the_halves_of_the_globe_meet() {
+    let leaf = Child { quadrant: [1, 1], nodes: tiles(&terrain(3, 40, 9_000, 1), 1).pop_first().unwrap().1.nodes };
+    let (east, _) = coarser(Tile { zoom: 0, x: 1, y: 0 }, &[leaf], 0).unwrap();
+    check_whole(&east);
+    let west = flat(Tile { zoom: 0, x: 0, y: 0 }).unwrap();
+    assert_eq!(side(&east, 0), side(&west, 1));
+    assert!(side(&west, 1).len() == 33);
+}
+
 #[test]
 fn the_list_names_each_tile_once() {
     let mut next = random(3);
@@ -342,4 +353,5 @@ fn the_finest_zoom_follows_the_density() {
     assert_eq!(finest_zoom(1e6, 2_000_000, 0.0), 18);
     assert_eq!(finest_zoom(1e6, 2_000_000, 1.2), 18);
     assert_eq!(finest_zoom(0.0, 0, 0.0), MOST_ZOOM);
+    assert_eq!(finest_zoom(1e12, 3, 0.0), 10);
 }

@@ -33,7 +33,13 @@ impl TerrainSystem {
             georeference.and_then(|text| serde_json::from_slice(text).ok()).unwrap_or_default();
         let said = extras.crs.as_deref().and_then(from_wkt::parse).unwrap_or_default();
         let datum = facts.globe.and_then(|globe| globe.vertical_datum);
-        let by_name = || datum.map(|name| VerticalSystem { name: Some(name), ..VerticalSystem::default() });
+        let code = |name: &str| name.strip_prefix("EPSG:")?.parse().ok();
+        let by_name = || {
+            datum.map(|name| match code(&name) {
+                Some(code) => VerticalSystem { epsg: Some(code), ..VerticalSystem::default() },
+                None => VerticalSystem { name: Some(name), ..VerticalSystem::default() },
+            })
+        };
         let crs = Crs {
             epsg: said.epsg.or(facts.epsg),
             horizontal: Unit::from_metres(Some(extras.metres_per_unit)),

@@ -5,6 +5,7 @@ use crate::tiles::curve::{ONE_TRANSFORM, ONE_TRANSFORM_SIDEWAYS};
 use crs::Crs;
 use crs::geoid::Geoid;
 use crs::geoid::option::HeightOffset;
+use crs::vertical::VerticalSystem;
 use rayon::prelude::*;
 use serde::Serialize;
 use tiles::curvature::Curvature;
@@ -72,7 +73,7 @@ pub(crate) fn place(crs: &Crs, frame: &Frame, geoid: Geoid, root: &mut TilesetNo
         curved: curvature.is_some(),
         per_tile,
         distortion_m,
-        vertical_datum: crs.vertical_name(),
+        vertical_datum: crs.vertical_system.as_ref().map(VerticalSystem::label),
         height_offset,
         geoid: ground.geoid_model().map(str::to_owned),
     })

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use sys::{Error, Result, disk};
+use tiles::file_names::is_number;
 
 /// What a written difference may have in its folder.
 const OWN: [&str; 7] = [RASTER, TILESET, TILESETS, TILES, LEVELS, SUMMARY, PARTIAL];
@@ -53,6 +54,11 @@ impl DifferenceFolder {
         let is_own = |entry: &Path| entry.file_name().is_some_and(|name| OWN.iter().any(|own| name == *own));
         if let Some(other) = entries.iter().filter(|entry| !is_own(entry)).min() {
             return refuse(format!("has {} in it", other.file_name().unwrap_or_default().display()));
+        }
+        for name in [TILESETS, TILES, LEVELS] {
+            if let Some(other) = foreign_below(&path.join(name))? {
+                return refuse(format!("has {} in it", other.strip_prefix(path).unwrap_or(&other).display()));
+            }
         }
         let folder = DifferenceFolder { path: path.into() };
         let is_stopped = disk::is_folder(&folder.partial()).map_err(unread)?;
@@ -131,6 +137,25 @@ impl DifferenceFolder {
     }
 }
 
+/// Returns a file below a folder that no difference has, if there is one: anything but tiles and tilesets by their numbers.
+fn foreign_below(folder: &Path) -> Result<Option<PathBuf>> {
+    for entry in disk::list(folder).map_err(Error::io("read", folder))? {
+        let is_folder = disk::is_folder(&entry).map_err(Error::io("read", &entry))?;
+        let is_numbered = entry.file_stem().is_some_and(|stem| is_number(&stem.to_string_lossy()));
+        let is_own = match entry.extension() {
+            None => is_folder,
+            Some(ending) => !is_folder && (ending == "glb" || ending == "json"),
+        };
+        if !is_numbered || !is_own {
+            return Ok(Some(entry));
+        }
+        if is_folder && let Some(other) = foreign_below(&entry)? {
+            return Ok(Some(other));
+        }
+    }
+    Ok(None)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,6 +195,17 @@ mod tests {
         fs::write(top.path().join("file"), "").unwrap();
         assert!(refused(&top.path().join("file")).contains("is a file"));
         assert!(refused(top.path()).contains("has file in it"));
+        // Beside the tiles of an earlier difference too.
+        for foreign in ["tiles/mine.glb", "levels/001/notes.txt", "tilesets/old/000001.json"] {
+            let earlier = tempfile::tempdir().unwrap();
+            for (name, text) in [("tiles/000000.glb", "tile"), (SUMMARY, OURS), (foreign, "theirs")] {
+                let path = earlier.path().join(name);
+                fs::create_dir_all(path.parent().unwrap()).unwrap();
+                fs::write(path, text).unwrap();
+            }
+            let told = refused(earlier.path());
+            assert!(foreign.starts_with(told.split(" has ").nth(1).unwrap().split(" in it").next().unwrap()), "{told}");
+        }
         let terrain = top.path().join("terrain");
         fs::create_dir_all(terrain.join("tiles")).unwrap();
         assert!(refused(&terrain).contains("no difference.json"));

@@ -38,7 +38,22 @@ pub(crate) fn check_terrain(plan: &Plan) -> Result<()> {
         return Ok(());
     }
     let globe = globe_of(plan)?;
-    check_places(plan, &globe, plan.extent)
+    // What headers claim may be far more than where points are, such as all of the globe. When they have been read, all of it is checked.
+    let middle = Place::of(plan, &globe, plan.extent.middle()).map_err(|why| refused(&why))?;
+    let places = corners(plan.extent).into_iter().filter_map(|corner| Place::of(plan, &globe, corner).ok());
+    let lowest = places.map(|place| place.latitude.abs()).fold(middle.latitude.abs(), f64::min).to_degrees();
+    if lowest > MOST_LATITUDE { Err(beyond_latitudes(lowest)) } else { Ok(()) }
+}
+
+/// Returns the corners of a box.
+fn corners(Bounds { min, max }: Bounds<2>) -> [[i32; 2]; 4] {
+    [min, [max[0], min[1]], [min[0], max[1]], max]
+}
+
+fn beyond_latitudes(highest: f64) -> Error {
+    refused(&format!(
+        "the terrain reaches {highest:.2} degrees north or south, and the columns of tiles meet at the poles; {MOST_LATITUDE} degrees is the limit"
+    ))
 }
 
 /// Checks that a terrain within `bounds` is neither around a pole nor around the globe.
@@ -58,10 +73,7 @@ pub(crate) fn check_places(plan: &Plan, globe: &Globe, bounds: Bounds<2>) -> Res
         widest = widest.max(2.0 * (place.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs());
     }
     if highest > MOST_LATITUDE {
-        return Err(refused(&format!(
-            "the terrain reaches {highest:.2} degrees north or south, and the columns of tiles meet at the poles; {MOST_LATITUDE} degrees is \
-             the limit"
-        )));
+        return Err(beyond_latitudes(highest));
     }
     if widest > MOST_LONGITUDES {
         return Err(refused(&format!(

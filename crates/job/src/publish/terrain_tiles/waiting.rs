@@ -30,7 +30,7 @@ impl WaitingFile {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub(super) fn create(path: PathBuf) -> Result<WaitingFile> {
+    pub(super) fn at(path: PathBuf) -> Result<WaitingFile> {
         let file = disk::create(&path).map_err(Error::io("create", &path))?;
         Ok(WaitingFile { path, file, end: Mutex::new(0) })
     }

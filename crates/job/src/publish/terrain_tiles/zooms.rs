@@ -3,8 +3,7 @@
 use crate::durable::directory::JobDirectory;
 use crate::publish::terrain_tiles::waiting::WaitingFile;
 use quantized_mesh::{
-    BorderNormal, Child, HEIGHT_STEPS, HeightSteps, LEVEL_ZERO_ERROR, OUTSIDE, Surface, Tile, TileMesh, assemble,
-    border_normals, coarser, encode, flat,
+    BorderNormal, Child, HeightSteps, OUTSIDE, Surface, Tile, TileMesh, assemble, border_normals, coarser, encode, flat,
 };
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -55,7 +54,7 @@ impl Zoom {
         finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         list.sort_unstable();
-        let file = WaitingFile::create(directory.terrain_meshes(zoom))?;
+        let file = WaitingFile::at(directory.terrain_meshes(zoom))?;
         let groups: Vec<&[WaitingPiece]> = list.chunk_by(|a, b| a.0 == b.0).collect();
         let made = groups.par_iter().with_max_len(1).map(|group| {
             interrupt::check()?;
@@ -98,7 +97,7 @@ impl Zoom {
         finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         let zoom = self.zoom.saturating_sub(1);
-        let file = WaitingFile::create(directory.terrain_meshes(zoom))?;
+        let file = WaitingFile::at(directory.terrain_meshes(zoom))?;
         let mut by_parent: Vec<(Tile, &WaitingTile)> =
             self.tiles.iter().map(|tile| (tile.tile.parent(), tile)).collect();
         by_parent.sort_unstable_by_key(|(parent, child)| (*parent, child.tile));
@@ -224,7 +223,7 @@ fn offsets() -> impl Iterator<Item = [i32; 2]> {
     (-1..=1).flat_map(|north| (-1..=1).map(move |east| [east, north])).filter(|offset| *offset != [0, 0])
 }
 
-/// What lies beside the terrain: a plain at the height of its edge, and the ellipsoid where tiles are so coarse that this makes no difference.
+/// What lies beside the terrain: a plain at the height of its edge, and the ellipsoid where the bound of a zoom is greater than that.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surroundings {
     /// In steps.
@@ -234,8 +233,7 @@ pub(super) struct Surroundings {
 impl Surroundings {
     /// Returns the height at a zoom.
     pub(super) fn at(self, zoom: u8) -> i32 {
-        let error = LEVEL_ZERO_ERROR * HEIGHT_STEPS / f64::from(1u32 << zoom);
-        if error <= f64::from(self.height).abs() { self.height } else { 0 }
+        if quantized_mesh::bound(zoom) <= self.height.unsigned_abs().into() { self.height } else { 0 }
     }
 }
 
