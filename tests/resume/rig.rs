@@ -229,6 +229,23 @@ impl Rig {
         Run::start(self.command().env("GDT_FAULT", format!("{name}:{count}"))).end()
     }
 
+    /// Stops runs at places, each when it is reached for so many times, and kills one after each phase. All end with the same bytes.
+    #[track_caller]
+    pub(crate) fn ends_alike_wherever_it_is_stopped(&mut self, places: &[(&str, u64)]) {
+        for (place, count) in places {
+            self.forget();
+            let what = format!("signal-{place}");
+            self.run_to(&what, *count).stopped(&["error: interrupted"]);
+            self.has_nothing_half_written(&what);
+            assert!(self.completes(&what)["resumed"].as_u64() >= Some(5));
+        }
+        self.forget();
+        while self.run_to("committed", 1).was_killed() {
+            self.has_nothing_half_written("a kill after a phase");
+        }
+        self.is_complete("kills after phases");
+    }
+
     /// Runs to the end and compares everything that was written. Returns the report.
     #[track_caller]
     pub(crate) fn completes(&self, what: &str) -> Value {

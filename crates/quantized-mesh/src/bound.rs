@@ -18,8 +18,8 @@ pub fn steps(zoom: u8) -> u64 {
 /// The most vertices that a tile of the finest zoom has on average.
 const VERTICES_PER_TILE: f64 = 16_384.0;
 
-/// The metres along a meridian, in about.
-const HALF_MERIDIAN: f64 = 20_003_931.0;
+/// Metres along half a meridian, about.
+pub const HALF_MERIDIAN: f64 = 20_003_931.0;
 
 /// Tiles of smaller zooms have vertices at least in a grid, so that they follow the curve of the earth. All finest tiles are flat enough without.
 pub(crate) const FIRST_FLAT_ZOOM: u8 = 10;

@@ -30,7 +30,7 @@ mod tile;
 mod unfold;
 
 pub use assemble::assemble;
-pub use bound::{LEVEL_ZERO_ERROR, finest_zoom, steps as bound};
+pub use bound::{HALF_MERIDIAN, LEVEL_ZERO_ERROR, finest_zoom, steps as bound};
 pub use coarser::{Child, coarser, flat};
 pub use cut::{Piece, cut};
 pub use decode::{DecodedTile, NotATile, decode};

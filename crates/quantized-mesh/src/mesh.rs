@@ -89,13 +89,17 @@ pub(crate) fn double_area([a, b, c]: [Node; 3]) -> i64 {
     bu * cv - bv * cu
 }
 
-/// Puts triangles into the order of a mesh of so many vertices.
-pub(crate) fn in_order(vertices: usize, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    let least_first = |[a, b, c]: [u32; 3]| match () {
+/// Returns a triangle from its least vertex on.
+pub(crate) fn least_first([a, b, c]: [u32; 3]) -> [u32; 3] {
+    match () {
         () if a < b && a < c => [a, b, c],
         () if b < c => [b, c, a],
         () => [c, a, b],
-    };
+    }
+}
+
+/// Puts triangles into the order of a mesh of so many vertices.
+pub(crate) fn in_order(vertices: usize, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let mut starts = vec![0u32; vertices + 1];
     let turned: Vec<[u32; 3]> = triangles.iter().map(|&triangle| least_first(triangle)).collect();
     turned.iter().for_each(|triangle| starts[triangle[0] as usize + 1] += 1);

@@ -1,6 +1,6 @@
 //! Triangles that rounding has turned over or flattened become others by flips of edges.
 
-use crate::mesh::{Node, double_area, in_order};
+use crate::mesh::{Node, double_area, in_order, least_first};
 use std::collections::{HashMap, HashSet};
 
 /// No tile needs as many rounds of flips.
@@ -24,18 +24,8 @@ pub(crate) fn unfolded(nodes: &[Node], triangles: Vec<[u32; 3]>) -> (Vec<[u32; 3
 
 /// Leaves out triangles that lie on one another, back to back.
 fn without_pairs(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    let turned = |[a, b, c]: [u32; 3]| {
-        let least = a.min(b).min(c);
-        if a == least {
-            [a, b, c]
-        } else if b == least {
-            [b, c, a]
-        } else {
-            [c, a, b]
-        }
-    };
-    let all: HashSet<[u32; 3]> = triangles.iter().map(|&triangle| turned(triangle)).collect();
-    let has_back = |[a, b, c]: [u32; 3]| all.contains(&turned([a, c, b]));
+    let all: HashSet<[u32; 3]> = triangles.iter().map(|&triangle| least_first(triangle)).collect();
+    let has_back = |[a, b, c]: [u32; 3]| all.contains(&least_first([a, c, b]));
     triangles.iter().copied().filter(|&triangle| !has_back(triangle)).collect()
 }
 

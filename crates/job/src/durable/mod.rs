@@ -16,3 +16,4 @@ pub mod obstacles;
 pub mod packing;
 mod replacement;
 pub mod store;
+pub(crate) mod waiting_file;

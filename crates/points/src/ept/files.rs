@@ -105,7 +105,7 @@ impl SideFile {
 
     fn request(&self) -> Option<WholeRequest<'_>> {
         let url = self.url.as_deref()?;
-        Some(WholeRequest { name: &self.path, url, most: LARGEST, about: self.about })
+        Some(WholeRequest::new(&self.path, url, LARGEST, self.about))
     }
 }
 

@@ -141,7 +141,7 @@ impl Reader {
             }
             true => {
                 let url = address(&path.to_string_lossy())?;
-                let request = WholeRequest { name: path, url: &url, most: MOST, about: ABOUT };
+                let request = WholeRequest::new(path, &url, MOST, ABOUT);
                 let missing = || Error::Config(format!("there is no file {}", path.display()));
                 serde_json::from_slice(request.fetch(false)?.ok_or_else(missing)?.bytes())
             }

@@ -66,16 +66,14 @@ impl WholeFile {
 
 /// A file that is read whole.
 pub(crate) struct WholeRequest<'a> {
-    pub(crate) name: &'a Path,
-    #[allow(dead_code, reason = "no URL is asked for")]
-    pub(crate) url: &'a str,
-    #[allow(dead_code, reason = "no file comes")]
-    pub(crate) most: u64,
-    #[allow(dead_code, reason = "no file comes")]
-    pub(crate) about: u64,
+    name: &'a Path,
 }
 
-impl WholeRequest<'_> {
+impl<'a> WholeRequest<'a> {
+    pub(crate) fn new(name: &'a Path, _: &'a str, _: u64, _: u64) -> WholeRequest<'a> {
+        WholeRequest { name }
+    }
+
     pub(crate) fn expect(&self) {}
 
     pub(crate) fn prepare(&self) {}

@@ -1,14 +1,13 @@
 //! Pieces of contour lines, in a file of their own until all tiles are traced.
 
+use crate::durable::waiting_file::WaitingFile;
 use bytemuck::{Zeroable, cast_slice, cast_slice_mut, zeroed_vec};
 use contours::{Band, Chain, Piece};
 use rayon::prelude::*;
-use std::fs::File;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use sys::positional_io::read_exact_at;
-use sys::{Error, Result, disk, fault};
+use sys::Result;
 
 /// The bytes of a point.
 pub(super) const POINT: u64 = size_of::<[f64; 2]>() as u64;
@@ -28,63 +27,49 @@ struct StoredBand {
 
 /// The chains of all tiles. Threads may add bands in any order.
 pub(super) struct WaitingChains {
-    path: PathBuf,
-    file: File,
-    places: Mutex<Places>,
-}
-
-#[derive(Default)]
-struct Places {
-    /// The bytes in the file.
-    end: u64,
-    bands: Vec<StoredBand>,
+    file: WaitingFile,
+    bands: Mutex<Vec<StoredBand>>,
 }
 
 impl WaitingChains {
     /// Makes the file at `path`.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn create(path: &Path) -> Result<WaitingChains> {
-        let file = disk::create(path).map_err(Error::io("create", path))?;
-        Ok(WaitingChains { path: path.into(), file, places: Mutex::default() })
+        Ok(WaitingChains { file: WaitingFile::at(path)?, bands: Mutex::default() })
     }
 
     /// Adds a band of a tile.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn add(&self, mut band: Band) -> Result<()> {
         if band.chains.is_empty() {
             return Ok(());
         }
         let (points, chains) = (size_of_val(&band.points[..]) as u64, size_of_val(&band.chains[..]) as u64);
-        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        let at = places.end;
+        let at = self.file.reserve(points + chains + size_of_val(&band.starts[..]) as u64);
         let (chains_at, starts_at) = (at + points, at + points + chains);
-        places.end = starts_at + size_of_val(&band.starts[..]) as u64;
-        places.bands.push(StoredBand { levels: band.levels(), chains_at, starts_at });
-        drop(places);
+        let stored = StoredBand { levels: band.levels(), chains_at, starts_at };
+        self.bands.lock().unwrap_or_else(PoisonError::into_inner).push(stored);
         band.chains.iter_mut().for_each(|chain| *chain = chain.moved_to(at + chain.at * POINT));
-        let write =
-            |bytes: &[u8], at: u64| disk::write_all_at(&self.file, bytes, at).map_err(Error::io("write", &self.path));
-        write(cast_slice(&band.points), at)?;
-        write(cast_slice(&band.chains), chains_at)?;
-        write(cast_slice(&band.starts), starts_at)
+        self.file.write(cast_slice(&band.points), at)?;
+        self.file.write(cast_slice(&band.chains), chains_at)?;
+        self.file.write(cast_slice(&band.starts), starts_at)
     }
 
     /// Ends the adding.
     pub(super) fn finish(self) -> FinishedChains {
-        let mut bands = self.places.into_inner().unwrap_or_else(PoisonError::into_inner).bands;
+        let mut bands = self.bands.into_inner().unwrap_or_else(PoisonError::into_inner);
         bands.sort_unstable_by_key(|band| (band.levels.start, band.chains_at));
-        FinishedChains { path: self.path, file: self.file, bands, next: 0, active: Vec::new() }
+        FinishedChains { file: self.file, bands, next: 0, active: Vec::new() }
     }
 }
 
 /// The chains of all tiles, to be taken level by level.
 pub(super) struct FinishedChains {
-    path: PathBuf,
-    file: File,
+    file: WaitingFile,
     /// All bands, by their first levels.
     bands: Vec<StoredBand>,
     /// The number of the first band that no level has reached yet.
@@ -97,7 +82,7 @@ impl FinishedChains {
     /// Returns the chains of a level in all tiles. Levels must be taken in ascending order. The place of a point is that of its bytes.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn chains_of(&mut self, level: u32) -> Result<Vec<Chain>> {
         while self.bands.get(self.next).is_some_and(|band| band.levels.start <= level) {
             self.active.push(self.next);
@@ -114,17 +99,17 @@ impl FinishedChains {
     fn chains_in(&self, band: &StoredBand, level: u32) -> Result<Vec<Chain>> {
         let number = u64::from(level - band.levels.start);
         let mut starts = [0u64; 2];
-        self.read(cast_slice_mut(&mut starts), band.starts_at + number * size_of::<u64>() as u64)?;
+        self.file.read(cast_slice_mut(&mut starts), band.starts_at + number * size_of::<u64>() as u64)?;
         let [from, to] = starts;
         let mut chains = vec![Chain::zeroed(); (to - from) as usize];
-        self.read(cast_slice_mut(&mut chains), band.chains_at + from * size_of::<Chain>() as u64)?;
+        self.file.read(cast_slice_mut(&mut chains), band.chains_at + from * size_of::<Chain>() as u64)?;
         Ok(chains)
     }
 
     /// Returns the points of pieces, one after the other.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn points_of(&self, pieces: &[Piece]) -> Result<Vec<[f64; 2]>> {
         let mut total = 0;
         let mut places: Vec<(Piece, usize)> = Vec::with_capacity(pieces.len());
@@ -145,7 +130,7 @@ impl FinishedChains {
             let (together, rest) = left.split_at(count);
             let past = together.iter().map(|(piece, _)| end(piece)).max().unwrap_or(first.at);
             bytes.resize((past - first.at) as usize, 0);
-            self.read(&mut bytes, first.at)?;
+            self.file.read(&mut bytes, first.at)?;
             for (piece, place) in together {
                 let target: &mut [u8] = cast_slice_mut(&mut points[*place..][..piece.points as usize]);
                 target.copy_from_slice(&bytes[(piece.at - first.at) as usize..][..target.len()]);
@@ -155,18 +140,12 @@ impl FinishedChains {
         Ok(points)
     }
 
-    fn read(&self, bytes: &mut [u8], at: u64) -> Result<()> {
-        let read = fault::read("read-result").and_then(|()| read_exact_at(&self.file, bytes, at));
-        read.map_err(Error::io("read", &self.path))
-    }
-
     /// Removes the file.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn discard(self) -> Result<()> {
-        drop(self.file);
-        disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))
+        self.file.discard()
     }
 }
 
@@ -179,7 +158,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let waiting = WaitingChains::create(&folder.path().join("chains")).unwrap();
         let points: Vec<[f64; 2]> = (0..200_000).map(|n| [f64::from(n), 0.5]).collect();
-        disk::write_all_at(&waiting.file, cast_slice(&points), 0).unwrap();
+        waiting.file.add(cast_slice(&points)).unwrap();
         let finished = waiting.finish();
         // Neighbours, far apart, the same twice as where a ring is cut, longer than is read at one time.
         let ranges = [150_000..150_003, 7..9, 3..7, 8..9, 0..100_000, 190_000..190_001, 189_999..190_001];

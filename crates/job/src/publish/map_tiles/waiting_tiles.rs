@@ -1,60 +1,47 @@
 //! Map tiles, in a file of their own until the archive is put together.
 
 use crate::durable::atomic_file::{PendingFile, PendingWriter};
-use std::fs::File;
-use std::path::{Path, PathBuf};
+use crate::durable::waiting_file::WaitingFile;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use sys::positional_io::read_exact_at;
-use sys::{Error, Result, disk, fault, interrupt};
+use sys::{Result, interrupt};
 use tiles::checksums::Checksum;
 use tiles::map_tiles::archive::{ArchiveAbout, WaitingTile, head};
 use tiles::map_tiles::tile_id::MapTile;
 
 /// The tiles that are finished. Threads may add tiles in any order.
 pub(crate) struct WaitingTiles {
-    path: PathBuf,
-    file: File,
-    places: Mutex<Places>,
-}
-
-#[derive(Default)]
-struct Places {
-    /// The bytes in the file.
-    end: u64,
+    file: WaitingFile,
     /// The tiles, and where each is in the file.
-    tiles: Vec<(WaitingTile, u64)>,
+    tiles: Mutex<Vec<(WaitingTile, u64)>>,
 }
 
 impl WaitingTiles {
     /// Makes the file at `path`.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(crate) fn create(path: &Path) -> Result<WaitingTiles> {
-        let file = disk::create(path).map_err(Error::io("create", path))?;
-        Ok(WaitingTiles { path: path.into(), file, places: Mutex::default() })
+        Ok(WaitingTiles { file: WaitingFile::at(path)?, tiles: Mutex::default() })
     }
 
     /// Adds a tile.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(crate) fn add(&self, tile: MapTile, bytes: &[u8]) -> Result<()> {
         let waiting = WaitingTile { id: tile.id(), length: bytes.len() as u32, checksum: Checksum::of(bytes).number() };
-        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        let at = places.end;
-        places.end += bytes.len() as u64;
-        places.tiles.push((waiting, at));
-        drop(places);
-        disk::write_all_at(&self.file, bytes, at).map_err(Error::io("write", &self.path))
+        let at = self.file.add(bytes)?;
+        self.tiles.lock().unwrap_or_else(PoisonError::into_inner).push((waiting, at));
+        Ok(())
     }
 
     /// Writes the archive as the pending file of `path`, and removes the waiting tiles. Returns the number of tiles too.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Interrupted`].
+    /// [`sys::Error::Io`], [`sys::Error::Interrupted`].
     pub(crate) fn write(self, about: &ArchiveAbout, path: &Path) -> Result<(u64, PendingFile)> {
-        let mut tiles = self.places.into_inner().unwrap_or_else(PoisonError::into_inner).tiles;
+        let mut tiles = self.tiles.into_inner().unwrap_or_else(PoisonError::into_inner);
         tiles.sort_unstable_by_key(|(tile, _)| tile.id);
         let waiting: Vec<WaitingTile> = tiles.iter().map(|(tile, _)| *tile).collect();
         let head = head(&waiting, about);
@@ -64,13 +51,11 @@ impl WaitingTiles {
         for (tile, at) in head.stored.iter().map(|n| tiles[*n]) {
             interrupt::check()?;
             bytes.resize(tile.length as usize, 0);
-            let read = fault::read("read-result").and_then(|()| read_exact_at(&self.file, &mut bytes, at));
-            read.map_err(Error::io("read", &self.path))?;
+            self.file.read(&mut bytes, at)?;
             out.write(&bytes)?;
         }
         let archive = out.finish()?;
-        drop(self.file);
-        disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))?;
+        self.file.discard()?;
         Ok((tiles.len() as u64, archive))
     }
 }

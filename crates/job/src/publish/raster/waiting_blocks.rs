@@ -1,76 +1,63 @@
 //! Packed blocks, in a file of their own until the raster is put together.
 
 use crate::durable::atomic_file::{PendingFile, PendingWriter};
-use std::fs::File;
-use std::path::{Path, PathBuf};
+use crate::durable::waiting_file::WaitingFile;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use sys::positional_io::read_exact_at;
-use sys::{Error, Result, disk, fault, interrupt};
+use sys::{Result, interrupt};
 use tiles::raster::geotiff::{RasterImage, TRAILER};
 use tiles::raster::grid::blocks;
 
 /// The blocks of a raster and its overviews. Threads may add blocks in any order.
 pub(crate) struct WaitingBlocks {
-    path: PathBuf,
-    file: File,
-    places: Mutex<Places>,
-}
-
-struct Places {
-    /// The bytes in the file.
-    end: u64,
+    file: WaitingFile,
     /// For each image and block: where it is, and its length. The length of a block without a height is 0: it is not in the file.
-    of_images: Vec<Vec<(u64, u32)>>,
+    of_images: Mutex<Vec<Vec<(u64, u32)>>>,
 }
 
 impl WaitingBlocks {
     /// Makes the file at `path` for images of these sizes.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(crate) fn create(path: &Path, sizes: &[[u32; 2]]) -> Result<WaitingBlocks> {
-        let file = disk::create(path).map_err(Error::io("create", path))?;
+        let file = WaitingFile::at(path)?;
         let places = |size: &[u32; 2]| {
             let [columns, rows] = blocks(*size);
             vec![(0, 0); columns * rows]
         };
-        let places = Mutex::new(Places { end: 0, of_images: sizes.iter().map(places).collect() });
-        Ok(WaitingBlocks { path: path.into(), file, places })
+        Ok(WaitingBlocks { file, of_images: Mutex::new(sizes.iter().map(places).collect()) })
     }
 
     /// Adds block number `block`, row by row, of image number `image`.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(crate) fn add(&self, image: usize, block: usize, bytes: &[u8]) -> Result<()> {
-        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        let at = places.end;
-        places.end += bytes.len() as u64;
-        places.of_images[image][block] = (at, bytes.len() as u32);
-        drop(places);
-        disk::write_all_at(&self.file, bytes, at).map_err(Error::io("write", &self.path))
+        let at = self.file.add(bytes)?;
+        let mut of_images = self.of_images.lock().unwrap_or_else(PoisonError::into_inner);
+        of_images[image][block] = (at, bytes.len() as u32);
+        Ok(())
     }
 
     /// Removes the file.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(crate) fn discard(self) -> Result<()> {
-        drop(self.file);
-        disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))
+        self.file.discard()
     }
 
     /// Ends the adding. `empty` stands for blocks without a height.
     pub(crate) fn finish(self, empty: Vec<u8>) -> FinishedBlocks {
-        let places = self.places.into_inner().unwrap_or_else(PoisonError::into_inner);
-        FinishedBlocks { path: self.path, file: self.file, empty, of_images: places.of_images }
+        let of_images = self.of_images.into_inner().unwrap_or_else(PoisonError::into_inner);
+        FinishedBlocks { file: self.file, empty, of_images }
     }
 }
 
 /// All blocks of a raster.
 pub(crate) struct FinishedBlocks {
-    path: PathBuf,
-    file: File,
+    file: WaitingFile,
     empty: Vec<u8>,
     of_images: Vec<Vec<(u64, u32)>>,
 }
@@ -90,7 +77,7 @@ impl FinishedBlocks {
     /// blocks.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Interrupted`].
+    /// [`sys::Error::Io`], [`sys::Error::Interrupted`].
     pub(crate) fn write(self, head: &[u8], path: &Path) -> Result<PendingFile> {
         let mut out = PendingWriter::create(path)?;
         out.write(head)?;
@@ -104,16 +91,14 @@ impl FinishedBlocks {
             });
             if length > 0 {
                 block.resize(length as usize, 0);
-                let read = fault::read("read-result").and_then(|()| read_exact_at(&self.file, &mut block, at));
-                read.map_err(Error::io("read", &self.path))?;
+                self.file.read(&mut block, at)?;
             }
             out.write(&(block.len() as u32).to_le_bytes())?;
             out.write(&block)?;
             out.write(&block[block.len().saturating_sub(TRAILER)..])?;
         }
         let raster = out.finish()?;
-        drop(self.file);
-        disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))?;
+        self.file.discard()?;
         Ok(raster)
     }
 }

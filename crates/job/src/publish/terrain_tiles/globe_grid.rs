@@ -5,7 +5,7 @@
 //! Cells are those of the lattice, not of tiles of the job, so that a point has the same place in all of them.
 
 use crate::plan::job_plan::Plan;
-use quantized_mesh::GridPoint;
+use quantized_mesh::{GridPoint, HALF_MERIDIAN};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use sys::{Error, Result};
@@ -17,9 +17,6 @@ const CELLS_PER_TILE: f64 = 16.0;
 
 /// The longest side of a cell in metres.
 const LONGEST_CELL: f64 = 2048.0;
-
-/// Metres along half a meridian, about.
-pub(super) const HALF_MERIDIAN: f64 = 20_003_931.0;
 
 /// A place on the globe.
 #[derive(Clone, Copy, Debug)]

@@ -1,19 +1,13 @@
 //! Files in which pieces and meshes of tiles wait.
 
+use crate::durable::waiting_file::WaitingFile;
 use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut, cast_slice, cast_slice_mut, zeroed_vec};
 use quantized_mesh::{BorderNormal, Node, OUTSIDE, Piece, TileMesh};
-use std::fs::File;
-use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
-use sys::positional_io::read_exact_at;
-use sys::{Error, Result, disk, fault};
+use std::path::Path;
+use sys::Result;
 
-/// A file of records. Threads may add some in any order.
-pub(super) struct WaitingFile {
-    path: PathBuf,
-    file: File,
-    end: Mutex<u64>,
-}
+/// Records in a file. Threads may add some in any order.
+pub(super) struct WaitingRecords(WaitingFile);
 
 /// What a record has, at its beginning.
 #[repr(C)]
@@ -25,20 +19,19 @@ struct Counts {
     corners: [i32; 4],
 }
 
-impl WaitingFile {
+impl WaitingRecords {
     /// Makes the file at `path`.
     ///
     /// # Errors
-    /// [`Error::Io`].
-    pub(super) fn at(path: PathBuf) -> Result<WaitingFile> {
-        let file = disk::create(&path).map_err(Error::io("create", &path))?;
-        Ok(WaitingFile { path, file, end: Mutex::new(0) })
+    /// [`sys::Error::Io`].
+    pub(super) fn at(path: &Path) -> Result<WaitingRecords> {
+        WaitingFile::at(path).map(WaitingRecords)
     }
 
     /// Adds a piece, and returns its place.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn add_piece(&self, piece: &Piece) -> Result<u64> {
         let corners = piece.corners.map(|corner| corner.unwrap_or(OUTSIDE));
         self.add(corners, &[], &piece.nodes, &piece.triangles)
@@ -47,7 +40,7 @@ impl WaitingFile {
     /// Adds a mesh with what it adds to the normals on its border, and returns its place.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn add_mesh(&self, mesh: &TileMesh, border: &[BorderNormal]) -> Result<u64> {
         self.add([OUTSIDE; 4], border, &mesh.nodes, &mesh.triangles)
     }
@@ -57,18 +50,13 @@ impl WaitingFile {
             [border.len(), nodes.len(), triangles.len()].map(|count| count as u32);
         let counts = Counts { border: of_border, nodes: of_nodes, triangles: of_triangles, corners };
         let record = [bytes_of(&counts), cast_slice(border), cast_slice(nodes), cast_slice(triangles)].concat();
-        let mut end = self.end.lock().unwrap_or_else(PoisonError::into_inner);
-        let at = *end;
-        *end += record.len() as u64;
-        drop(end);
-        disk::write_all_at(&self.file, &record, at).map_err(Error::io("write", &self.path))?;
-        Ok(at)
+        self.0.add(&record)
     }
 
     /// Reads a piece.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn piece(&self, at: u64) -> Result<Piece> {
         let (counts, mut at) = self.counts(at)?;
         at += u64::from(counts.border) * size_of::<BorderNormal>() as u64;
@@ -80,7 +68,7 @@ impl WaitingFile {
     /// Reads a mesh.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn mesh(&self, at: u64) -> Result<TileMesh> {
         let Piece { nodes, triangles, .. } = self.piece(at)?;
         Ok(TileMesh { nodes, triangles })
@@ -89,7 +77,7 @@ impl WaitingFile {
     /// Reads the vertices of a mesh.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn nodes(&self, at: u64) -> Result<Vec<Node>> {
         let (counts, mut at) = self.counts(at)?;
         at += u64::from(counts.border) * size_of::<BorderNormal>() as u64;
@@ -99,7 +87,7 @@ impl WaitingFile {
     /// Reads what a mesh adds to the normals on its border.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn border(&self, at: u64) -> Result<Vec<BorderNormal>> {
         let (counts, mut at) = self.counts(at)?;
         self.list(&mut at, counts.border)
@@ -107,29 +95,23 @@ impl WaitingFile {
 
     fn counts(&self, at: u64) -> Result<(Counts, u64)> {
         let mut counts = Counts::zeroed();
-        self.read(bytes_of_mut(&mut counts), at)?;
+        self.0.read(bytes_of_mut(&mut counts), at)?;
         Ok((counts, at + size_of::<Counts>() as u64))
     }
 
     /// Reads so many things, and goes on behind them.
     fn list<T: Pod>(&self, at: &mut u64, count: u32) -> Result<Vec<T>> {
         let mut list = zeroed_vec(count as usize);
-        self.read(cast_slice_mut(&mut list), *at)?;
+        self.0.read(cast_slice_mut(&mut list), *at)?;
         *at += size_of_val(&list[..]) as u64;
         Ok(list)
-    }
-
-    fn read(&self, bytes: &mut [u8], at: u64) -> Result<()> {
-        let read = fault::read("read-result").and_then(|()| read_exact_at(&self.file, bytes, at));
-        read.map_err(Error::io("read", &self.path))
     }
 
     /// Removes the file.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`sys::Error::Io`].
     pub(super) fn discard(self) -> Result<()> {
-        drop(self.file);
-        disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))
+        self.0.discard()
     }
 }

@@ -7,7 +7,7 @@ use crate::publish::raster::tile_meshes::{TileBox, boxes, lattice_mesh};
 use crate::publish::side_files::EachTile;
 use crate::publish::terrain_tiles::check::{check_places, globe_of};
 use crate::publish::terrain_tiles::globe_grid::{GlobeGrid, Place};
-use crate::publish::terrain_tiles::waiting::WaitingFile;
+use crate::publish::terrain_tiles::waiting::WaitingRecords;
 use crate::publish::terrain_tiles::zooms::{Surroundings, WaitingPiece, Zoom};
 use delaunay::geometry::Bounds;
 use delaunay::geometry::predicates::orient2d;
@@ -190,8 +190,8 @@ impl<'a> TerrainWork<'a> {
         grid: &GlobeGrid,
         is_mirrored: bool,
         done: &(dyn Fn(u64) + Sync),
-    ) -> Result<(WaitingFile, Vec<WaitingPiece>)> {
-        let (file, list) = (WaitingFile::at(directory.terrain_pieces())?, Mutex::new(Vec::new()));
+    ) -> Result<(WaitingRecords, Vec<WaitingPiece>)> {
+        let (file, list) = (WaitingRecords::at(&directory.terrain_pieces())?, Mutex::new(Vec::new()));
         self.tiles.par_iter().with_max_len(1).try_for_each(|tile| {
             interrupt::check()?;
             let mut mesh = lattice_mesh(&directory.output().tile(tile.tile.number()), self.frame)?;

@@ -1,7 +1,7 @@
 //! The tiles of one zoom after the other.
 
 use crate::durable::directory::JobDirectory;
-use crate::publish::terrain_tiles::waiting::WaitingFile;
+use crate::publish::terrain_tiles::waiting::WaitingRecords;
 use quantized_mesh::{
     BorderNormal, Child, HeightSteps, OUTSIDE, Surface, Tile, TileMesh, assemble, border_normals, coarser, encode, flat,
 };
@@ -35,7 +35,7 @@ pub(super) struct Zoom {
     pub(super) zoom: u8,
     /// In order.
     pub(super) tiles: Vec<WaitingTile>,
-    file: WaitingFile,
+    file: WaitingRecords,
 }
 
 /// A piece of a tile, and its place in the file.
@@ -49,12 +49,12 @@ impl Zoom {
     pub(super) fn finest(
         zoom: u8,
         directory: &JobDirectory,
-        pieces: WaitingFile,
+        pieces: WaitingRecords,
         mut list: Vec<WaitingPiece>,
         finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         list.sort_unstable();
-        let file = WaitingFile::at(directory.terrain_meshes(zoom))?;
+        let file = WaitingRecords::at(&directory.terrain_meshes(zoom))?;
         let groups: Vec<&[WaitingPiece]> = list.chunk_by(|a, b| a.0 == b.0).collect();
         let made = groups.par_iter().with_max_len(1).map(|group| {
             interrupt::check()?;
@@ -97,7 +97,7 @@ impl Zoom {
         finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         let zoom = self.zoom.saturating_sub(1);
-        let file = WaitingFile::at(directory.terrain_meshes(zoom))?;
+        let file = WaitingRecords::at(&directory.terrain_meshes(zoom))?;
         let mut by_parent: Vec<(Tile, &WaitingTile)> =
             self.tiles.iter().map(|tile| (tile.tile.parent(), tile)).collect();
         by_parent.sort_unstable_by_key(|(parent, child)| (*parent, child.tile));
@@ -121,7 +121,7 @@ impl Zoom {
     }
 
     /// Makes the tile above some, which are all tiles in it.
-    fn above(&self, group: &[(Tile, &WaitingTile)], file: &WaitingFile, outside: i32) -> Result<WaitingTile> {
+    fn above(&self, group: &[(Tile, &WaitingTile)], file: &WaitingRecords, outside: i32) -> Result<WaitingTile> {
         let tile = group[0].0;
         let child = |(_, child): &(Tile, &WaitingTile)| {
             let quadrant = [child.tile.x & 1, child.tile.y & 1].map(|half| half as u8);
@@ -196,7 +196,7 @@ impl Zoom {
 
 impl WaitingTile {
     /// Adds a mesh with this bound to a file.
-    fn add(file: &WaitingFile, tile: Tile, mesh: &TileMesh, bound: u64) -> Result<WaitingTile> {
+    fn add(file: &WaitingRecords, tile: Tile, mesh: &TileMesh, bound: u64) -> Result<WaitingTile> {
         let at = file.add_mesh(mesh, &border_normals(mesh, tile))?;
         let ground = mesh.nodes.iter().map(|node| node.h).filter(|h| *h != OUTSIDE);
         let heights = ground.fold([i32::MAX, i32::MIN], |[low, high], h| [low.min(h), high.max(h)]);

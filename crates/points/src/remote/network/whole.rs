@@ -49,16 +49,21 @@ impl WholeFile {
 /// A file that is read whole.
 pub(crate) struct WholeRequest<'a> {
     /// What messages call the file.
-    pub(crate) name: &'a Path,
+    name: &'a Path,
     /// Its URL, with its query.
-    pub(crate) url: &'a str,
+    url: &'a str,
     /// It has no more bytes than this.
-    pub(crate) most: u64,
+    most: u64,
     /// It has about so many.
-    pub(crate) about: u64,
+    about: u64,
 }
 
-impl WholeRequest<'_> {
+impl<'a> WholeRequest<'a> {
+    /// Returns the request for the file that messages call `name`, with its URL and query. It has about so many bytes, and no more than `most`.
+    pub(crate) fn new(name: &'a Path, url: &'a str, most: u64, about: u64) -> WholeRequest<'a> {
+        WholeRequest { name, url, most, about }
+    }
+
     /// Says that the file will be fetched once more, and not again.
     pub(crate) fn expect(&self) {
         state().expected.insert(self.hash());
