@@ -53,6 +53,9 @@ pub struct Cli {
     /// Point clouds: files, folders, patterns such as "tiles/*.laz", URLs. Or the configuration of a job (TOML).
     #[arg(value_name = "FILE")]
     pub files: Vec<PathBuf>,
+    /// Compute only what has changed since the last run with this option, and keep what the next one needs. The first run computes all.
+    #[arg(long, requires = "files")]
+    pub update: bool,
     /// Start the job over instead of continuing an interrupted run.
     #[arg(long, requires = "files")]
     pub restart: bool,

@@ -93,7 +93,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
                 None => Task::of_environment(*phase, *tasks, |name| std::env::var(name).ok())?,
             };
             let progress = print.progress_output();
-            let run = RunOptions { progress, force: *force, restart: false, submission: *submission };
+            let run = RunOptions { progress, force: *force, restart: false, update: false, submission: *submission };
             work(config, *phase, task, *threads, run, print)
         }
         (Some(CliCommand::Submit { config, engine, tasks, restart, dry_run, added }), _) => {
@@ -157,6 +157,7 @@ fn run_options(cli: &Cli) -> RunOptions {
         progress: cli.print.progress_output(),
         force: cli.force,
         restart: cli.restart || cli.fresh,
+        update: cli.update,
         submission: 0,
     }
 }

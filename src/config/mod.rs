@@ -213,6 +213,7 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
         texture: one_of("texture", file.gpu.texture, texture)?.unwrap_or_default(),
     };
     Ok(JobOptions {
+        updates: false,
         input: file.input,
         breaklines: file.breaklines,
         triangulation: TriangulationOptions { backend, max_points_per_tile, max_points_per_part },

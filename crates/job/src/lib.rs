@@ -45,7 +45,11 @@ use std::time::SystemTime;
 /// first step leaves the directory as it was.
 pub fn run(options: &JobOptions, run: impl Into<RunOptions>) -> Result<Report> {
     // The plan, what is around every attempt (the directory, its lock, the journal), and the walk through the phases.
-    run_until_it_fits(options, run.into(), false)
+    let run = run.into();
+    match run.update {
+        true => run_until_it_fits(&options.clone().with_updates(), run, false),
+        false => run_until_it_fits(options, run, false),
+    }
 }
 
 /// Does one task of one phase of the job.

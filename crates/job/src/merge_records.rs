@@ -137,6 +137,17 @@ pub struct SeamOfTile {
 }
 
 impl SeamOfTile {
+    /// Puts the triangles and the edges in an order that depends on nothing but these: which triangles a merge finds first depends on all of
+    /// its sites.
+    pub fn sort(&mut self) {
+        for triangle in &mut self.triangles {
+            let first = (0..3).min_by_key(|&corner| triangle[corner].plane()).unwrap_or(0);
+            triangle.rotate_left(first);
+        }
+        self.triangles.sort_unstable_by_key(|triangle| triangle.map(|corner| corner.plane()));
+        self.trimmed.sort_unstable();
+    }
+
     /// Adds what another seam has.
     pub fn add(&mut self, other: SeamOfTile) {
         self.triangles.extend(other.triangles);

@@ -2,7 +2,7 @@
 
 use crate::progress::stage::ProgressOutput;
 use delaunay_gpu::options::GpuOptions;
-use delaunay_gpu::triangulation_options::TriangulationOptions;
+use delaunay_gpu::triangulation_options::{MaxPointsPerPart, TriangulationOptions};
 use points::lines::options::LineOptions;
 use points::options::InputOptions;
 use serde::{Deserialize, Serialize};
@@ -26,6 +26,9 @@ pub struct JobOptions {
     pub output: OutputOptions,
     /// What the job may use of the machine.
     pub limits: Limits,
+    /// Whether the job keeps what a later run needs that does only what has changed since.
+    #[serde(default)]
+    pub updates: bool,
     /// What the user should know about the options themselves.
     #[serde(default, skip_serializing_if = "Warnings::is_empty")]
     pub warnings: Warnings,
@@ -35,10 +38,25 @@ pub struct JobOptions {
 /// threads on two processors take an eighth more processor time than two.
 const MOST_PER_PROCESSOR: usize = 2;
 
+/// About how many points a part has of a job that is to be updated: about those of one file of a survey. A change takes the parts that it
+/// touches; smaller parts take more time for what is between them.
+const POINTS_PER_PART_OF_UPDATES: MaxPointsPerPart = MaxPointsPerPart(1_000_000);
+
 impl JobOptions {
     /// Tells whether vertices are found among the points: those on the ground, or few of them.
     pub fn leaves_points_out(&self) -> bool {
         self.input.finds_ground() || self.output.selects()
+    }
+
+    /// Returns the options of a job that keeps what a later run needs that does only what has changed: its mesh, in small parts.
+    #[must_use]
+    pub fn with_updates(mut self) -> JobOptions {
+        self.updates = true;
+        self.limits.keep_steps = KeepSteps::Always;
+        if self.triangulation.max_points_per_part == MaxPointsPerPart::default() {
+            self.triangulation.max_points_per_part = POINTS_PER_PART_OF_UPDATES;
+        }
+        self
     }
 
     /// The number of worker threads, at most two for each processor.
@@ -59,13 +77,15 @@ pub struct RunOptions {
     pub force: bool,
     /// Whether to start over instead of going on with an interrupted run.
     pub restart: bool,
+    /// Whether to do only what has changed since the last run, and to keep what the next one needs for that.
+    pub update: bool,
     /// The submission that starts the job over: what tasks did before it does not count. 0 if there is none.
     pub submission: u64,
 }
 
 impl From<ProgressOutput> for RunOptions {
     fn from(progress: ProgressOutput) -> RunOptions {
-        RunOptions { progress, force: false, restart: false, submission: 0 }
+        RunOptions { progress, force: false, restart: false, update: false, submission: 0 }
     }
 }
 

@@ -31,6 +31,16 @@ pub struct Lattice {
 }
 
 impl Lattice {
+    /// Tells whether it has all points of `other`: the steps are the same, and the offsets are whole numbers of them apart.
+    pub fn has_points_of(&self, other: &Lattice) -> bool {
+        let steps = [self.resolution, self.resolution, self.resolution_z];
+        let is_whole = |axis: usize| {
+            let distance = self.offset[axis].checked_sub(other.offset[axis]);
+            distance.and_then(|distance| distance.checked_rem(steps[axis])).is_some_and(|rest| rest.is_zero())
+        };
+        (self.resolution, self.resolution_z) == (other.resolution, other.resolution_z) && (0..3).all(is_whole)
+    }
+
     /// Returns the lattice with these steps, or `None` if the world coordinate of some `i32` needs more digits than a decimal has.
     pub fn new(offset: [Decimal; 3], resolution: Decimal, resolution_z: Decimal) -> Option<Lattice> {
         let lattice = Lattice { offset, resolution, resolution_z };

@@ -101,6 +101,18 @@ pub fn rename(from: &Path, to: &Path) -> Result<()> {
     traced(|| fs::rename(from, to), |()| (format!("rename {}\t{}", from.display(), to.display()), &[]))
 }
 
+/// Gives the file at `from` the path `to` too, in place of what is there. Where the file system has no hard links, `to` becomes a copy.
+/// `partial` is a path beside `to` that nothing else has.
+pub fn link(from: &Path, to: &Path, partial: &Path) -> Result<()> {
+    remove_file(partial)?;
+    let copy = || fs::copy(from, partial).and_then(|_| File::open(partial)?.sync_all());
+    let linked = || fs::hard_link(from, partial).or_else(|_| copy());
+    traced(linked, |()| (format!("link {}\t{}", from.display(), partial.display()), &[]))?;
+    rename(partial, to)?;
+    // Where both were links to one file already, nothing was renamed.
+    remove_file(partial)
+}
+
 /// Removes the file at `path` if it exists.
 pub fn remove_file(path: &Path) -> Result<()> {
     let remove = || fs::remove_file(path);

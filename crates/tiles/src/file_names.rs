@@ -126,6 +126,11 @@ impl OutputFiles {
         self.directory.join(CHECKSUMS)
     }
 
+    /// Returns the path of the list of what an update has changed.
+    pub fn changes(&self) -> PathBuf {
+        self.directory.join("update.json")
+    }
+
     /// Returns the picture of the whole terrain.
     pub fn preview(&self) -> PathBuf {
         self.directory.join("preview.png")

@@ -88,6 +88,16 @@ impl JobDirectory {
         self.job.join("plan.json")
     }
 
+    /// Returns the path of the plan of the first run of a job that is to be updated.
+    pub fn first_plan(&self) -> PathBuf {
+        self.job.join("first-plan.json")
+    }
+
+    /// Returns the path where the list of what an update has changed waits.
+    pub fn changes(&self) -> PathBuf {
+        self.job.join("update.json")
+    }
+
     /// Returns the path of the file in which the blocks of a raster wait.
     pub fn raster_blocks(&self, product: RasterProduct) -> PathBuf {
         self.job.join(format!("{}.blocks", product.names()[1]))
@@ -242,12 +252,12 @@ impl JobDirectory {
     }
 
     /// Puts the results with these `names`, which wait, in the place of the results of an earlier job. Goes on where an earlier call
-    /// was cut off. If this succeeds, all of them are in place.
+    /// was cut off. If this succeeds, all of them are in place. In a job that is to be updated they stay where they wait, too.
     ///
     /// # Errors
     /// [`Error::Io`] if a file is missing, or cannot be renamed or removed.
-    pub fn replace_results(&self, names: &HashSet<PathBuf>) -> Result<()> {
-        let replacement = Replacement::prepare(&self.results, &self.waiting, names)?;
+    pub fn replace_results(&self, names: &HashSet<PathBuf>, keeps_waiting: bool) -> Result<()> {
+        let replacement = Replacement::prepare(&self.results, &self.waiting, names, keeps_waiting)?;
         replacement.map_or(Ok(()), |replacement| replacement.carry_out())
     }
 
@@ -257,6 +267,22 @@ impl JobDirectory {
     /// [`Error::Io`] if it cannot be read.
     pub fn has_page_of_others(&self) -> Result<bool> {
         is_page_of_others(&self.results)
+    }
+
+    /// Removes the results that wait, except those with these names, and the files that only a run needs that is under way.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be removed.
+    pub(crate) fn keep_results(&self, names: &HashSet<PathBuf>) -> Result<()> {
+        let mut results = Leftovers::of(&self.waiting)?.files;
+        results.retain(|path| !names.contains(&self.name(path)));
+        let stay = [self.journal(), self.plan(), self.first_plan(), lock_file(&self.job)];
+        for path in entries(&self.job)? {
+            if !stay.contains(&path) && !is_folder(&path)? {
+                results.push(path);
+            }
+        }
+        results.iter().try_for_each(|path| remove_file(path))
     }
 
     /// Returns the paths of all results of an earlier job that may exist.
@@ -304,7 +330,7 @@ mod tests {
         assert!(theirs.iter().all(|path| path.exists()) && old.exists());
         fs::create_dir_all(directory.output().directory()).unwrap();
         fs::write(directory.output().report(), "{}").unwrap();
-        directory.replace_results(&names(&["report.json"])).unwrap();
+        directory.replace_results(&names(&["report.json"]), false).unwrap();
         assert!(theirs.iter().all(|path| path.exists()));
         assert!(!old.exists() && !directory.results().levels().exists() && !directory.results().checksums().exists());
         // A kill may leave an empty job directory: the next job may take it.
@@ -368,7 +394,7 @@ mod tests {
                 fs::create_dir_all(output.path().join(name).parent().unwrap()).unwrap();
                 fs::rename(directory.file(Path::new(name)), output.path().join(name)).unwrap();
             }
-            directory.replace_results(&names(&new)).unwrap();
+            directory.replace_results(&names(&new), false).unwrap();
             let found = Leftovers::of(directory.results()).unwrap().files.into_iter().filter(|path| path.exists());
             let found: HashSet<PathBuf> = found.map(|path| directory.name(&path)).collect();
             // The report goes last. When it is there, nothing more is done.
@@ -395,12 +421,12 @@ mod tests {
         fs::write(directory.output().report(), "{}").unwrap();
         fs::write(directory.results().page(), "theirs").unwrap();
         let names = names(&["index.html", "report.json"]);
-        let error = directory.replace_results(&names).unwrap_err();
+        let error = directory.replace_results(&names, false).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Usage);
         assert!(error.to_string().contains("move it away"), "{error}");
         assert_eq!(fs::read(directory.results().page()).unwrap(), b"theirs");
         fs::remove_file(directory.results().page()).unwrap();
-        directory.replace_results(&names).unwrap();
+        directory.replace_results(&names, false).unwrap();
         assert!(fs::read_to_string(directory.results().page()).unwrap().contains("data-terrain"));
     }
 
@@ -419,12 +445,12 @@ mod tests {
         fs::write(directory.output().report(), "{}").unwrap();
         write_list(directory.output(), &["tiles/000000.glb", "tiles/000001.glb"]);
         let names = names(&["tiles/000000.glb", "tiles/000001.glb", "XXH128SUMS", "report.json"]);
-        let error = directory.replace_results(&names).unwrap_err();
+        let error = directory.replace_results(&names, false).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Usage);
         assert!(error.to_string().contains("000000.glb came during the job, and no job wrote it"), "{error}");
         assert_eq!(fs::read(directory.results().tile(0)).unwrap(), b"theirs");
         fs::remove_file(directory.results().tile(0)).unwrap();
-        directory.replace_results(&names).unwrap();
+        directory.replace_results(&names, false).unwrap();
         assert_eq!(fs::read(directory.results().tile(0)).unwrap(), b"new");
     }
 

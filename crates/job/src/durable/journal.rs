@@ -84,6 +84,14 @@ impl PublishedFile {
 }
 
 impl<S: StepKey, K: RecordKey> JournalEntry<S, K> {
+    /// Returns the entry with other figures.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if the figures cannot be written down.
+    pub fn with_figures(self, figures: &impl Serialize) -> Result<JournalEntry<S, K>> {
+        Ok(JournalEntry { figures: serde_json::value::to_raw_value(figures).map_err(unwritable)?, ..self })
+    }
+
     /// Returns the figures of the phase.
     ///
     /// # Errors

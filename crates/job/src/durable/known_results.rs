@@ -25,7 +25,7 @@ impl KnownResults {
     pub(crate) fn of(folders: &[&OutputFiles]) -> Result<KnownResults> {
         let mut known = KnownResults::default();
         for folder in folders {
-            let own = [folder.report(), folder.checksums()];
+            let own = [folder.report(), folder.checksums(), folder.changes()];
             let names = own.iter().filter_map(|path| path.strip_prefix(folder.directory()).ok());
             known.names.extend(names.map(Path::to_path_buf));
             known.add(&folder.checksums())?;

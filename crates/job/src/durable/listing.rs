@@ -32,6 +32,7 @@ impl Leftovers {
         let mut files = vec![
             output.report(),
             output.checksums(),
+            output.changes(),
             output.terrain(),
             output.tileset(),
             output.georeference(),

@@ -4,7 +4,7 @@
 //! renames, removals and syncs are left that can fail. Between the removal of the old report and the arrival of the new one some
 //! files are old and some are new, and there is no report. If a failure ends the run there, the next run goes on with it.
 
-use crate::durable::atomic_file::{create_folder, remove_file, sync_folder};
+use crate::durable::atomic_file::{create_folder, partial_path, remove_file, sync_folder};
 use crate::durable::known_results::KnownResults;
 use crate::durable::listing::{Leftovers, check_page_is_ours, exists};
 use std::collections::{BTreeSet, HashSet};
@@ -29,6 +29,8 @@ pub(crate) struct Replacement {
     directory: OpenFolder,
     /// The folders of numbered files, each after those in it. They can be opened, but they are too many to keep open.
     numbered_folders: Vec<PathBuf>,
+    /// Whether the results stay where they wait, too.
+    keeps_waiting: bool,
 }
 
 impl Replacement {
@@ -42,6 +44,7 @@ impl Replacement {
         results: &OutputFiles,
         waiting: &OutputFiles,
         names: &HashSet<PathBuf>,
+        keeps_waiting: bool,
     ) -> Result<Option<Replacement>> {
         let [report, new_report] = [results, waiting].map(OutputFiles::report);
         if !exists(&new_report)? && exists(&report)? {
@@ -83,7 +86,25 @@ impl Replacement {
         let numbered_folders = Leftovers::of(results)?.folders;
         numbered_folders.iter().try_for_each(|path| open(path).map(|_| ()))?;
         let directory = open(results.directory())?;
-        Ok(Some(Replacement { report, new_report, waiting: found, list, outdated, directory, numbered_folders }))
+        let waiting = found;
+        Ok(Some(Replacement {
+            report,
+            new_report,
+            waiting,
+            list,
+            outdated,
+            directory,
+            numbered_folders,
+            keeps_waiting,
+        }))
+    }
+
+    fn put(&self, waits: &Path, place: &Path) -> Result<()> {
+        let put = match self.keeps_waiting {
+            true => disk::link(waits, place, &partial_path(place)),
+            false => disk::rename(waits, place),
+        };
+        put.map_err(Error::io("rename the finished file to", place))
     }
 
     /// Does it. Every file is replaced at once, so there is no moment without one.
@@ -95,7 +116,7 @@ impl Replacement {
         sync(&self.directory)?;
         for (waits, place) in &self.waiting {
             fault::point("replacing");
-            rename(waits, place)?;
+            self.put(waits, place)?;
         }
         self.outdated.iter().try_for_each(|path| remove_file(path))?;
         for folder in &self.numbered_folders {
@@ -107,21 +128,17 @@ impl Replacement {
         sync(&self.directory)?;
         if let Some((waits, place)) = &self.list {
             fault::point("replacing");
-            rename(waits, place)?;
+            self.put(waits, place)?;
             sync(&self.directory)?;
         }
         fault::point("replacing");
-        rename(&self.new_report, &self.report)?;
+        self.put(&self.new_report, &self.report)?;
         sync(&self.directory)
     }
 }
 
 fn open(folder: &Path) -> Result<OpenFolder> {
     OpenFolder::open(folder).map_err(Error::io("open", folder))
-}
-
-fn rename(from: &Path, to: &Path) -> Result<()> {
-    disk::rename(from, to).map_err(Error::io("rename the finished file to", to))
 }
 
 fn sync(folder: &OpenFolder) -> Result<()> {

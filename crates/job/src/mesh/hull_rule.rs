@@ -57,7 +57,8 @@ impl HullRule {
     /// Returns the rule that takes no triangle for one on ground.
     pub(crate) fn of_lengths(plan: &Plan) -> HullRule {
         let spacings = if plan.options.output.selects() { SPACINGS_OF_SELECTED } else { SPACINGS };
-        HullRule::of_points(plan.records, plan.claimed_area, spacings)
+        let (records, area) = plan.density();
+        HullRule::of_points(records, area, spacings)
     }
 
     /// Returns the rule where so many points share an `area` in square lattice steps, and an edge is long from so many of their spacings on. No

@@ -126,6 +126,8 @@ pub(crate) struct WrittenPoints {
     pub(crate) wanted: u64,
     /// Those of them that were dropped because another has the same x and y.
     pub(crate) duplicates: u64,
+    /// Tells the points that were written from others, in a job that is to be updated.
+    pub(crate) digest: u64,
 }
 
 /// The points of all parts.
@@ -234,6 +236,7 @@ impl<'a> PointsInBlocks<'a> {
         let file = file_of_selected(parts);
         let file = PointFile::create(&directory.point_file(file), file)?;
         let buckets = Buckets::new(&file, parts.grid.buckets(), read_buffer_memory(&self.plan.options));
+        let buckets = buckets.with_digests(self.plan.options.updates);
         let tiles: Vec<TileIndex> = part.partition.tree.tiles().collect();
         let write = |tile| -> Result<[u64; 2]> {
             let (mut sites, duplicates) = self.sites(number, tile)?;
@@ -249,11 +252,13 @@ impl<'a> PointsInBlocks<'a> {
         };
         let sum = |a: [u64; 2], b: [u64; 2]| Ok([a[0] + b[0], a[1] + b[1]]);
         let [wanted, duplicates] = tiles.into_par_iter().with_max_len(1).map(write).try_reduce(|| [0; 2], sum)?;
-        let blocks = ReadBlocks::of(buckets.finish()?);
+        let buckets = buckets.finish()?;
+        let digest = buckets.iter().fold(0, |all, bucket| bucket.digest.wrapping_add(all));
+        let blocks = ReadBlocks::of(buckets);
         if sync {
             file.sync()?;
         }
-        Ok(WrittenPoints { blocks, wanted, duplicates })
+        Ok(WrittenPoints { blocks, wanted, duplicates, digest })
     }
 }
 

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use sys::{Error, Result};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// What one bucket holds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -14,6 +15,8 @@ pub struct Bucket {
     pub blocks: Vec<PointBlock>,
     /// The number of points in them.
     pub points: u64,
+    /// Tells these points from others, whatever their order; 0 unless [`Buckets::with_digests`] wants it.
+    pub digest: u64,
 }
 
 /// Smaller blocks cost more system calls than their memory is worth, and more bytes, because points are packed in groups of 256.
@@ -32,6 +35,7 @@ pub struct Buckets<'a> {
     open: Vec<Mutex<OpenBucket>>,
     /// Whether a bucket without a file got a point.
     has_refused: AtomicBool,
+    has_digests: bool,
 }
 
 #[derive(Default)]
@@ -58,7 +62,14 @@ impl<'a> Buckets<'a> {
             capacity,
             open: (0..count).map(|_| Mutex::default()).collect(),
             has_refused: AtomicBool::new(false),
+            has_digests: false,
         }
+    }
+
+    /// Returns the same buckets, with a digest of the points in each if `wanted`.
+    #[must_use]
+    pub fn with_digests(self, wanted: bool) -> Buckets<'a> {
+        Buckets { has_digests: wanted, ..self }
     }
 
     /// Returns the bytes of one buffer where memory is ample.
@@ -94,6 +105,10 @@ impl<'a> Buckets<'a> {
         let block = file.append(&mut open.run, &open.buffer, is_last)?;
         open.bucket.blocks.push(block);
         open.bucket.points += block.points as u64;
+        if self.has_digests {
+            let points = open.buffer.iter().map(|point| xxh3_64(bytemuck::bytes_of(point)));
+            open.bucket.digest = points.fold(open.bucket.digest, u64::wrapping_add);
+        }
         open.buffer.clear();
         Ok(())
     }

@@ -36,6 +36,9 @@ pub struct PointsForPart {
     blocks: u64,
     /// Their bytes.
     pub bytes: u64,
+    /// Tells these points from others, in a job that is to be updated.
+    #[serde(default)]
+    digest: u64,
 }
 
 /// What the inputs of a reader held.
@@ -49,6 +52,8 @@ pub struct ReadInputs {
     malformed: Option<(usize, PointCounts)>,
     /// The inputs, and what they were called when they were read.
     inputs: Vec<KnownInput>,
+    /// The part that needs them first.
+    reader: PartIndex,
 }
 
 /// An input, and what it was called when it was read.
@@ -60,6 +65,19 @@ struct KnownInput {
 }
 
 impl ReadInputs {
+    /// Gives the inputs the numbers that they have in the plan of `parts`: in an update, files may have come or gone since.
+    pub(crate) fn renumber_inputs(&mut self, parts: &Parts) {
+        let known: Vec<usize> = self.inputs.iter().map(|known| known.index).collect();
+        let present = |old: usize| {
+            let place = known.iter().position(|&index| index == old)?;
+            parts.new_inputs(self.reader).get(place).copied()
+        };
+        self.inputs.iter_mut().for_each(|known| known.index = present(known.index).unwrap_or(known.index));
+        if let Some((index, _)) = &mut self.malformed {
+            *index = present(*index).unwrap_or(*index);
+        }
+    }
+
     /// Calls the inputs what they are called in `plan`.
     pub(crate) fn rename_inputs(&mut self, plan: &Plan) {
         let pairs = self.inputs.iter().map(|known| (&known.path, &plan.inputs[known.index].source.path));
@@ -134,6 +152,7 @@ pub fn read_inputs(
     let files = parts.all().map(|part| create(parts, directory, reader, part)).collect::<Result<Vec<_>>>()?;
     let file_of = |bucket: usize| files[parts.part_of(bucket).get()].as_ref();
     let buckets = Buckets::on((0..parts.grid.buckets()).map(file_of).collect(), read_buffer_memory(&plan.options));
+    let buckets = buckets.with_digests(plan.options.updates);
     let by_input = decode(plan, inputs.iter().copied(), malformed, &parts.grid, &buckets, stage);
     let filled = by_input.and_then(|by_input| Ok((by_input, buckets.finish()?)));
     let (by_input, buckets) = filled.map_err(|error| match error {
@@ -153,20 +172,21 @@ pub fn read_inputs(
     }
     let (mut by_part, mut read) = (Vec::new(), ReadBlocks::default());
     for part in parts.all() {
-        let before = read.blocks.len();
+        let (before, mut digest) = (read.blocks.len(), 0u64);
         for bucket in parts.buckets_of(part) {
+            digest = digest.wrapping_add(buckets[bucket].digest);
             read.blocks.extend(&buckets[bucket].blocks);
             read.buckets.resize(read.blocks.len(), bucket as u32);
         }
         let blocks = &read.blocks[before..];
         if !blocks.is_empty() {
             let bytes = blocks.iter().map(PointBlock::bytes).sum();
-            by_part.push(PointsForPart { part, blocks: blocks.len() as u64, bytes });
+            by_part.push(PointsForPart { part, blocks: blocks.len() as u64, bytes, digest });
         }
     }
     let known = |&index: &usize| KnownInput { index, path: plan.inputs[index].source.path.clone() };
     let inputs = inputs.iter().map(known).collect();
-    Ok((ReadInputs { summary, by_part, malformed, inputs }, read))
+    Ok((ReadInputs { summary, by_part, malformed, inputs, reader }, read))
 }
 
 /// Returns the number of the file with the selected points of a part. Readers, and what divides crowded buckets, have lower numbers.
@@ -213,12 +233,14 @@ pub struct PointsOfPart<'a> {
     are_selected: bool,
     /// The blocks, each with the number of its bucket.
     blocks: Vec<(u32, PointBlock)>,
+    /// Tells the points from others, in a job that is to be updated.
+    digest: u64,
 }
 
 impl<'a> PointsOfPart<'a> {
     /// Returns no points of `part`.
     pub fn none(plan: &'a Plan, parts: &'a Parts, part: PartIndex) -> PointsOfPart<'a> {
-        PointsOfPart { plan, parts, part, are_selected: false, blocks: Vec::new() }
+        PointsOfPart { plan, parts, part, are_selected: false, blocks: Vec::new(), digest: 0 }
     }
 
     /// Returns the selected points of the part, `blocks` blocks that its `store` has.
@@ -243,6 +265,7 @@ impl<'a> PointsOfPart<'a> {
             is_own
         });
         let Some(own) = own else { return Ok(()) };
+        self.digest = self.digest.wrapping_add(own.digest);
         self.add_blocks(store, StepRecord::Read(reader), first, own.blocks as usize)
     }
 
@@ -253,6 +276,11 @@ impl<'a> PointsOfPart<'a> {
         let blocks = columns.column_part::<PointBlock>(first, count)?;
         self.blocks.extend(buckets.iter().copied().zip(blocks.iter().copied()));
         Ok(())
+    }
+
+    /// Returns what tells the points from others, in a job that is to be updated.
+    pub(crate) fn digest(&self) -> u64 {
+        self.digest
     }
 
     /// Tells whether the files of the part in `directory` hold what was written to them.

@@ -6,7 +6,8 @@ use crate::index::{NodeIndex, PartIndex};
 use crate::partition::grid::{Grid, GridSpan, GridSums};
 use crate::partition::tree::{Cell, NodeKind, Tree, TreeNode};
 use crate::partition::tree_builder::wanted_buckets;
-use crate::plan::job_plan::{Plan, PlannedInput};
+use crate::plan::job_plan::Plan;
+use crate::plan::plan_cut::CutInput;
 use delaunay::geometry::Bounds;
 
 /// The parts of a job. They depend on its plan alone.
@@ -29,9 +30,10 @@ impl Parts {
     /// Cuts the plane for the job of `plan`.
     pub fn of(plan: &Plan) -> Parts {
         let triangulation = &plan.options.triangulation;
-        let grid = Grid::over(plan.extent, wanted_buckets(plan.records, triangulation.max_points_per_tile.0));
+        let cut = plan.cut();
+        let grid = Grid::over(cut.extent, wanted_buckets(cut.records, triangulation.max_points_per_tile.0));
         let reach: Vec<GridSpan> = plan.inputs.iter().map(|input| grid.span_of(input.claimed)).collect();
-        let sums = expected_points(&grid, &plan.inputs);
+        let sums = expected_points(&grid, &cut.inputs);
         let mut cutter = PartCutter { tree: Tree::default(), spans: Vec::new(), sums, most: plan.points_per_part() };
         cutter.cut(Cell::PLANE, None, grid.span());
         let PartCutter { mut tree, spans, sums, .. } = cutter;
@@ -105,12 +107,12 @@ impl Parts {
 }
 
 /// Returns how many points the buckets hold if the points of each input are spread evenly over its box.
-fn expected_points(grid: &Grid, inputs: &[PlannedInput]) -> GridSums {
+fn expected_points(grid: &Grid, inputs: &[CutInput]) -> GridSums {
     let mut points = vec![0u64; grid.buckets()];
     for input in inputs {
         let area = |bounds: Bounds<2>| [0, 1].map(|axis| bounds.extent(axis) as u128 + 1).iter().product::<u128>();
         let whole = area(input.claimed);
-        let records = u128::from(input.decoded_records());
+        let records = u128::from(input.records);
         for (bucket, shared) in grid.shared_with(input.claimed) {
             points[bucket] += (records * area(shared) / whole) as u64;
         }

@@ -95,6 +95,7 @@ mod tests {
         );
         let options: JobOptions = serde_json::from_str(&text).unwrap();
         JobOptions {
+            updates: false,
             limits: Limits { memory: MemoryLimit(memory), threads: Threads(threads), ..Limits::default() },
             ..options
         }

@@ -64,7 +64,7 @@ pub struct JobIdentity {
 
 /// Version of the records in the store, of the plan, of the names and bytes of results, and of which nodes merge. It changes with every
 /// change of these, so that no run misreads what another version left, or mixes its results with them.
-pub(crate) const LAYOUT: u32 = 32;
+pub(crate) const LAYOUT: u32 = 33;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -102,6 +102,9 @@ const MAP_TILES: &str = "[output.raster] pmtiles";
 fn steps_of(option: &str) -> Option<&'static [JobStep]> {
     FROM_TILES.iter().find(|(name, _)| *name == option).map(|(_, steps)| *steps)
 }
+
+/// What a job is called that keeps what an update needs.
+const UPDATES: &str = "--update";
 
 /// What to do about a job that is no longer what tasks planned.
 pub(crate) const PLAN_AGAIN: &str = "run the phase plan again, or let gdt-batch submit do it";
@@ -144,6 +147,10 @@ impl Fingerprint {
         mesh.extend(named_values(&options.triangulation, "triangulation", &["backend"])?);
         for (number, lines) in (1..).zip(&options.breaklines) {
             mesh.extend(named_values(lines, &format!("breaklines {number}"), &["files"])?);
+        }
+        if options.updates {
+            // Such a job has journals of its own kind.
+            mesh.insert(UPDATES.into(), true.into());
         }
         // The points' own colours are read only if they are wanted.
         mesh.insert("[output] color".into(), options.output.color.may_be_own().into());
@@ -241,6 +248,39 @@ impl Fingerprint {
         fingerprint_of(self.files.samples())
     }
 
+    /// Returns what tells the content of the input at `path` from others.
+    pub(crate) fn content_of(&self, path: &Path) -> Option<[u64; 3]> {
+        self.files.content_of(path)
+    }
+
+    /// Tells whether the job keeps what an update needs.
+    pub(crate) fn updates(&self) -> bool {
+        self.mesh.contains_key(UPDATES)
+    }
+
+    /// Tells whether an update leads from `earlier` to this: nothing has changed that the mesh depends on but the inputs.
+    pub(crate) fn may_update(&self, earlier: &Fingerprint) -> bool {
+        !matches!(self.with_files_of(earlier).since(earlier), JobChange::Mesh(_))
+    }
+
+    /// Returns what has changed since `earlier` that tiles depend on besides their mesh.
+    pub(crate) fn style_since(&self, earlier: &Fingerprint) -> Option<String> {
+        match self.with_files_of(earlier).since(earlier) {
+            JobChange::Style(what) => Some(what),
+            _ => None,
+        }
+    }
+
+    /// Returns the names of the inputs that are other than those of `earlier`.
+    pub(crate) fn inputs_since(&self, earlier: &Fingerprint) -> Vec<String> {
+        self.files.since(&earlier.files)
+    }
+
+    /// Returns this fingerprint with the inputs of `earlier`.
+    fn with_files_of(&self, earlier: &Fingerprint) -> Fingerprint {
+        Fingerprint { files: earlier.files.clone(), ..self.clone() }
+    }
+
     /// Returns what has changed since `earlier`.
     pub fn since(&self, earlier: &Fingerprint) -> JobChange {
         if self.program != earlier.program {
@@ -303,7 +343,7 @@ fn changed_values(earlier: &Map<String, Value>, now: &Map<String, Value>) -> Vec
 }
 
 /// Returns the first few of `names` as a text.
-fn first_few(names: Vec<String>) -> String {
+pub(crate) fn first_few(names: Vec<String>) -> String {
     const MAX_NAMES: usize = 5;
     let more = names.len().saturating_sub(MAX_NAMES);
     let named = names[..names.len() - more].join(", ");

@@ -82,6 +82,13 @@ impl InputIdentities {
         InputIdentities(self.0.iter().map(without).collect())
     }
 
+    /// Returns what tells the content of the file at `path` from others: its size, samples and time. `None` if it is none of these.
+    pub(crate) fn content_of(&self, path: &Path) -> Option<[u64; 3]> {
+        let file = self.0.iter().find(|file| file.path == path)?;
+        let ContentIdentity { samples: FileSamples { bytes, samples }, modified } = file.content;
+        Some([bytes, samples, modified])
+    }
+
     /// Returns the names of the files that have changed since `earlier`; none if the files have the same contents in the same
     /// order.
     pub(crate) fn since(&self, earlier: &InputIdentities) -> Vec<String> {

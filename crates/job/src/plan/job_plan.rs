@@ -9,6 +9,7 @@ use crate::plan::ground_triangles::GroundTriangles;
 use crate::plan::input_identity::RenamedInputs;
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::plan::missing_attributes::missing_attributes;
+use crate::plan::plan_cut::{CutInput, PlanCut};
 use breaklines::Breaklines;
 use crs::Crs;
 use delaunay::geometry::Bounds;
@@ -16,6 +17,7 @@ use lattice::Lattice;
 use points::options::InputOptions;
 use points::{PointCounts, PointRules, Source};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use sys::{Error, Result, Warnings};
@@ -56,6 +58,9 @@ pub struct Plan {
     pub unit: String,
     /// The area of the box around all records in square lattice steps, as headers claim it, whatever part of it the user wants.
     pub claimed_area: u64,
+    /// How the plane is cut, where an update keeps the cuts of the first run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) cut: Option<PlanCut>,
     /// The way from the lattice to glTF, of a scene that is not bent.
     pub frame: Frame,
     /// How the scene follows the curve of the earth. It is found once, by the claims, and kept, because not all projections have the same bits
@@ -87,6 +92,9 @@ pub struct PlannedInput {
     pub rules: PointRules,
     /// The lattice box of its points, as far as its header tells.
     pub claimed: Bounds<2>,
+    /// In a job that is to be updated, what tells its points from those of other files, or of this one at other times; else 0.
+    #[serde(default)]
+    pub(crate) key: u64,
 }
 
 impl PlannedInput {
@@ -154,11 +162,26 @@ impl Plan {
     /// Returns about how many points a part is to have: all, if they are not many more. Numbers of tiles leave room for a limited number of
     /// parts.
     pub(crate) fn points_per_part(&self) -> u64 {
-        let wanted = self.options.triangulation.max_points_per_part;
-        match self.decoded_records() <= wanted.most_in_one_part() {
+        let (wanted, cut) = (self.options.triangulation.max_points_per_part, self.cut());
+        match cut.decoded_records() <= wanted.most_in_one_part() {
             true => u64::MAX,
-            false => wanted.0.max(self.records.div_ceil(PartIndex::MOST as u64 / 2)),
+            false => wanted.0.max(cut.records.div_ceil(PartIndex::MOST as u64 / 2)),
         }
+    }
+
+    /// Returns how the plane is cut.
+    pub(crate) fn cut(&self) -> Cow<'_, PlanCut> {
+        if let Some(cut) = &self.cut {
+            return Cow::Borrowed(cut);
+        }
+        let input = |input: &PlannedInput| CutInput { claimed: input.claimed, records: input.decoded_records() };
+        let inputs = self.inputs.iter().map(input).collect();
+        Cow::Owned(PlanCut { extent: self.extent, records: self.records, area: self.claimed_area, inputs })
+    }
+
+    /// Returns the number of records, and the area that they share, which decide what is far apart.
+    pub(crate) fn density(&self) -> (u64, u64) {
+        self.cut.as_ref().map_or((self.records, self.claimed_area), |cut| (cut.records, cut.area))
     }
 
     /// Returns the number of records that are decoded.

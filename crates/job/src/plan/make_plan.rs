@@ -55,11 +55,23 @@ const MAX_WARNINGS: usize = 50;
 /// [`Error::Config`] if there are no inputs or they do not fit together; [`Error::Input`] if one is bad and must not be left
 /// out; [`crate::Error::NoTerrain`] if none is left; [`Error::Io`] if one cannot be read.
 pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> crate::Result<Plan> {
+    make_plan_on(None, options, coarsening)
+}
+
+/// As [`make_plan`], on the lattice `known` if that has the points as the lattice would that is chosen without it.
+///
+/// # Errors
+/// As [`make_plan`].
+pub(crate) fn make_plan_on(
+    known: Option<&Lattice>,
+    options: &JobOptions,
+    coarsening: LatticeCoarsening,
+) -> crate::Result<Plan> {
     refuse_contradicting_options(options)?;
     set_network_memory(network_memory(options));
     let named = named_inputs(&options.input)?;
     let (sources, skipped) = open_all(&named.paths, &options.input, &row_choice(options))?;
-    let mut plan = plan_sources(sources, skipped, options, coarsening)?;
+    let mut plan = plan_sources(sources, skipped, options, (coarsening, known))?;
     let mut notes = Warnings::default();
     notes.extend(named.notes);
     notes.shorten(MAX_WARNINGS);
@@ -92,7 +104,7 @@ fn plan_sources(
     mut sources: Vec<Source>,
     mut skipped: Vec<SkippedInput>,
     options: &JobOptions,
-    coarsening: LatticeCoarsening,
+    wish: (LatticeCoarsening, Option<&Lattice>),
 ) -> crate::Result<Plan> {
     loop {
         if let (true, Some(first)) = (sources.is_empty(), skipped.first()) {
@@ -103,7 +115,7 @@ fn plan_sources(
                 first.why
             )));
         }
-        match try_plan(&mut sources, options, coarsening) {
+        match try_plan(&mut sources, options, wish) {
             Err(crate::Error::System(Error::Input { path, what }))
                 if options.input.on_bad_file == OnBadFile::Skip && sources.iter().any(|s| s.path == path) =>
             {
@@ -116,7 +128,7 @@ fn plan_sources(
             }
             planned => {
                 let (plan, rules) = planned?;
-                let planned_input = |(source, (rules, claimed))| PlannedInput { source, rules, claimed };
+                let planned_input = |(source, (rules, claimed))| PlannedInput { source, rules, claimed, key: 0 };
                 let inputs = sources.into_iter().zip(rules).map(planned_input).collect();
                 return Ok(Plan { inputs, skipped, ..plan });
             }
@@ -128,7 +140,7 @@ fn plan_sources(
 fn try_plan(
     sources: &mut [Source],
     options: &JobOptions,
-    coarsening: LatticeCoarsening,
+    (coarsening, known): (LatticeCoarsening, Option<&Lattice>),
 ) -> crate::Result<(Plan, Vec<(PointRules, Bounds<2>)>)> {
     let mut warnings = Warnings::default();
     sources.iter().for_each(|source| warnings.extend_from_file(&source.path, &source.warnings));
@@ -168,6 +180,7 @@ fn try_plan(
     let mut extent = extent_without_outliers(sources, options, &wish)?;
     lines.extend_heights(&mut extent)?;
     let lattice = choose_lattice(sources, &extent, &wish, &mut warnings)?;
+    let lattice = known.filter(|known| known.has_points_of(&lattice)).cloned().unwrap_or(lattice);
     let planned_clip = clip.map(|clip| clip.on_lattice(&lattice)).transpose()?;
     let wanted = &mut options.clone();
     let options = within_clip(wanted, planned_clip.as_ref().map(|clip| clip.reach));
@@ -193,7 +206,7 @@ fn try_plan(
     let sample = HeightSample::take(sources, &rules, options.input.rectangle())?;
     let hint = AreaHint { sources, options, extent: &extent, clipped, lattice: &lattice, wish: &wish };
     if hint.shows_far_points(&sample) {
-        return try_plan(sources, options, LatticeCoarsening { far_points: true, ..coarsening });
+        return try_plan(sources, options, (LatticeCoarsening { far_points: true, ..coarsening }, known));
     }
     check_malformed_sample(sources, &sample, &options.input)?;
     refuse_zero_points(sources, &extent, &sample, &lattice)?;
@@ -256,6 +269,7 @@ fn try_plan(
         crs,
         unit: unit.into(),
         claimed_area,
+        cut: None,
         frame,
         curvature: None,
         breaklines,

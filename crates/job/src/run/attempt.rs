@@ -8,8 +8,9 @@ use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours
 use crate::options::{JobOptions, RunOptions};
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
+use crate::plan::job_plan::{Claims, Plan};
 use crate::plan::lattice_choice::LatticeCoarsening;
-use crate::plan::make_plan::{are_there_far_points, make_plan};
+use crate::plan::make_plan::{are_there_far_points, make_plan, make_plan_on};
 use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::contour_estimate::ContourSample;
 use crate::preflight::input_places::check_inputs_are_no_results;
@@ -29,6 +30,7 @@ use crate::run::part_entries::PartJournals;
 use crate::run::phases::do_phases;
 use crate::run::phases::plan_phase::note_skipped;
 use crate::run::phases::stage_costs::stage_costs;
+use crate::run::update::first_plan_file::has_first_plan;
 use crate::run::whole_run::WholeRun;
 use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
@@ -176,9 +178,12 @@ fn attempt(
     let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
     let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
     let has_plan = known.is_some();
-    let mut plan = match known {
-        Some(plan) => plan,
-        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening))?,
+    let (mut plan, is_update) = match known {
+        Some(plan) => (plan, false),
+        None => {
+            let first = earlier.as_ref().and_then(|earlier| earlier.first_plan(directory, &header));
+            on_threads(workers(options, 0)?, || planned(job, coarsening, first.as_ref()))?
+        }
     };
     check_inputs_are_no_results(&plan)?;
     plan.warnings.extend(job.modified.clone());
@@ -195,7 +200,7 @@ fn attempt(
     let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan, contours_of_all.as_ref()));
     note_skipped(&plan.skipped, progress);
     contours_of_all.and_then(|contours| contours.warning(&plan)).iter().for_each(|warning| progress.note(warning));
-    if !run.force && !is_by_tasks {
+    if !run.force && !is_by_tasks && !is_update {
         on_threads(threads, || require_memory_and_disk(&plan, threads, contours.as_ref()))?;
     }
     check_results_are_ours(directory, options.output.page)?;
@@ -216,14 +221,18 @@ fn attempt(
     let begun = earlier.as_ref().filter(|_| is_by_tasks).and_then(|earlier| earlier.begun());
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
-        progress.note("the interrupted run had written all its results");
+        if options.updates {
+            progress.note("nothing has changed since the last run");
+            return Ok(report);
+        }
+        progress.note("the last run had written all its results");
         on_threads(threads, || remove_job(directory))?;
         return Ok(report);
     }
     job.triangulator.prepare(plan.records, threads);
     let keeps_mesh = plan.keeps_mesh();
     on_threads(threads, || {
-        let start = start(directory, &header, earlier, has_plan, is_by_tasks, run.progress)?;
+        let start = start(directory, &header, earlier, has_plan, is_update, is_by_tasks, run.progress)?;
         let RunStart { journal, job_id, resumed } = start;
         let whole_run = WholeRun {
             triangulator: &job.triangulator,
@@ -249,38 +258,79 @@ fn attempt(
         let of_parts = || PartJournals::of(directory, job_id).map_or(1, |parts| parts.len());
         let complete = journal.complete() + outcome.as_ref().err().map_or(0, |_| of_parts());
         drop(journal);
-        end(directory, outcome, complete, is_by_tasks, keeps_mesh)
+        let ended =
+            EndedRun { directory, phases: complete, is_by_tasks, keeps_mesh, updates: options.updates, is_update };
+        ended.end(outcome)
     })
 }
 
-/// Ends an attempt: puts the results in place, or keeps the complete phases if the job can go on from them. Removes everything else, but
-/// never the work of tasks after an error.
-fn end(
-    directory: &JobDirectory,
-    outcome: Result<Report>,
+/// Returns the plan of a job, and whether it is an update of the job that had the plan `first`.
+fn planned(job: &JobRequest, coarsening: LatticeCoarsening, first: Option<&Plan>) -> Result<(Plan, bool)> {
+    let options = job.options;
+    if let Some(first) = first {
+        let plan = make_plan_on(Some(&first.lattice), options, coarsening)?;
+        match plan.laid_out_as(first) {
+            Ok(plan) => return Ok((plan.with_keys(&job.fingerprint)?, true)),
+            Err(why) => job.run.progress.note(&format!("everything is computed again: {why}")),
+        }
+    }
+    let mut plan = make_plan(options, coarsening)?;
+    if options.updates {
+        plan = plan.with_keys(&job.fingerprint)?;
+        plan.claims = plan.claims.map(Claims::with_room);
+    }
+    Ok((plan, false))
+}
+
+/// An attempt that has ended.
+struct EndedRun<'a> {
+    directory: &'a JobDirectory,
+    /// The phases that are complete.
     phases: u64,
     is_by_tasks: bool,
     keeps_mesh: bool,
-) -> Result<Report> {
-    let outcome = outcome.and_then(|report| match place_results_of_finished_job(directory) {
-        Err(sys::Error::Io { source, .. }) if is_by_tasks && source.kind() == std::io::ErrorKind::NotFound => {
-            Err(Error::DamagedSteps)
-        }
-        placed => Ok(placed.map(|()| report)?),
-    });
-    match outcome {
-        Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),
-        // With a corrected configuration a job that has freed its mesh may start over, so nothing is promised.
-        Err(why @ Error::System(sys::Error::Config(_))) if phases > 0 && !keeps_mesh => Err(why),
-        Err(why) if may_go_on(&why) && phases > 0 => {
-            Err(Error::Resumable { why: Box::new(why), phases, job: directory.job().into() })
-        }
-        outcome => {
-            let cleaned = remove_job(directory);
-            // The first error is the one to report.
-            outcome.and_then(|report| Ok(cleaned.map(|()| report)?))
+    /// Whether the job is to be updated.
+    updates: bool,
+    /// Whether it was an update.
+    is_update: bool,
+}
+
+impl EndedRun<'_> {
+    /// Puts the results in place, or keeps the complete phases if the job can go on from them. Removes everything else, but never the work
+    /// of tasks after an error, nor what an update needs.
+    fn end(self, outcome: Result<Report>) -> Result<Report> {
+        let EndedRun { directory, phases, is_by_tasks, keeps_mesh, updates, is_update } = self;
+        let outcome = outcome.and_then(|report| match place_results_of_finished_job(directory, updates) {
+            Err(sys::Error::Io { source, .. }) if is_by_tasks && source.kind() == std::io::ErrorKind::NotFound => {
+                Err(Error::DamagedSteps)
+            }
+            placed => Ok(placed.map(|()| report)?),
+        });
+        match outcome {
+            Ok(report) if updates && has_first_plan(directory)? => {
+                let results = directory.waiting_results();
+                directory.keep_results(&results.iter().map(|path| directory.name(path)).collect())?;
+                Ok(report)
+            }
+            Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),
+            // With a corrected configuration a job that has freed its mesh may start over, so nothing is promised.
+            Err(why @ Error::System(sys::Error::Config(_))) if phases > 0 && !keeps_mesh => Err(why),
+            Err(why) if may_go_on(&why) && phases > 0 => {
+                Err(Error::Resumable { why: Box::new(why), phases, job: directory.job().into() })
+            }
+            Err(why) if is_update && !is_to_be_tried_again(&why) => Err(why),
+            outcome => {
+                let cleaned = remove_job(directory);
+                // The first error is the one to report.
+                outcome.and_then(|report| Ok(cleaned.map(|()| report)?))
+            }
         }
     }
+}
+
+/// Tells whether the next attempt begins anew.
+fn is_to_be_tried_again(why: &Error) -> bool {
+    matches!(why, Error::OtherThanClaimed { .. } | Error::DamagedSteps | Error::TooFine { .. })
 }
 
 /// Tells whether another run can make use of the complete phases: with the same options, or with others for how tiles look.

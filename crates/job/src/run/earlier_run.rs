@@ -8,7 +8,7 @@ use crate::durable::directory::JobDirectory;
 use crate::durable::journal;
 use crate::durable::journal::{PublishedFile, records_of};
 use crate::options::JobOptions;
-use crate::plan::fingerprint::{Fingerprint, JobChange, JobHeader, PLAN_AGAIN};
+use crate::plan::fingerprint::{Fingerprint, JobChange, JobHeader, PLAN_AGAIN, first_few};
 use crate::plan::job_plan::Plan;
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::progress::stage::{ProgressOutput, Stage};
@@ -18,6 +18,8 @@ use crate::run::done::Done;
 use crate::run::part_entries::{PartHeader, PartJournals, open_store};
 use crate::run::phases::meshed_part::MeshedPart;
 use crate::run::single_process;
+use crate::run::update::changes::place_changes;
+use crate::run::update::first_plan_file::first_plan;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::io::{self, ErrorKind};
@@ -78,7 +80,16 @@ impl EarlierRun {
             return Ok(());
         }
         self.is_complete = true;
-        directory.replace_results(&names)
+        directory.replace_results(&names, self.header.as_ref().is_some_and(|header| header.fingerprint.updates()))?;
+        place_changes(directory)
+    }
+
+    /// Returns the plan of the first run, if the job with `header` is an update of this one: its mesh depends on the same options, and both
+    /// are to be updated.
+    pub(crate) fn first_plan(&self, directory: &JobDirectory, header: &JobHeader) -> Option<Plan> {
+        let old = self.header.as_ref().filter(|old| old.coarsening == header.coarsening)?;
+        let is_update = header.fingerprint.updates() && header.fingerprint.may_update(&old.fingerprint);
+        is_update.then(|| first_plan(directory)).flatten()
     }
 
     fn results<'a>(&'a self, directory: &'a JobDirectory) -> impl Iterator<Item = &'a PublishedFile> {
@@ -166,6 +177,22 @@ impl EarlierRun {
         let path = directory.results().report();
         let text = std::fs::read(&path).map_err(Error::io("read", &path))?;
         Ok(serde_json::from_slice(&text).ok())
+    }
+
+    /// Drops what is not in an update, the job with `header`, whatever its inputs hold. The key of each phase tells the rest.
+    fn kept_for_update(mut self, header: &JobHeader, progress: ProgressOutput) -> EarlierRun {
+        let old = self.header.as_ref().map(|old| &old.fingerprint);
+        let inputs = old.map(|old| header.fingerprint.inputs_since(old)).unwrap_or_default();
+        if !inputs.is_empty() {
+            progress.note(&format!("changed since the last run: {}", first_few(inputs)));
+        }
+        if let Some(what) = old.and_then(|old| header.fingerprint.style_since(old)) {
+            progress.note(&format!("changed since the last run: {what}; all tiles are written again"));
+            self.parts.drop_steps(&[JobStep::Tiles, JobStep::Levels, JobStep::Join]);
+            self.has_dropped = true;
+        }
+        self.entries.clear();
+        self
     }
 
     /// Drops what does not hold for the job with `header`, whose plan stays if `has_plan`. Returns `None` if the job starts over.
@@ -273,12 +300,12 @@ fn are_all_results(directory: &JobDirectory, names: &HashSet<PathBuf>) -> Result
     Ok(listed.chain(own).collect::<HashSet<_>>() == *names)
 }
 
-/// Puts the results of a job in place that has just written its report.
+/// Puts the results of a job in place that has just written its report. If it `updates`, they stay where they wait, too.
 ///
 /// # Errors
 /// As [`JobDirectory::replace_results`]; [`Error::Io`] if the journal cannot be read, or does not name the report: then it does not
 /// name all results either.
-pub(crate) fn place_results_of_finished_job(directory: &JobDirectory) -> Result<()> {
+pub(crate) fn place_results_of_finished_job(directory: &JobDirectory, updates: bool) -> Result<()> {
     let (mut names, mut has_report) = (HashSet::new(), false);
     let mut visit = |step, files: Vec<PublishedFile>| {
         has_report |= step == JobStep::Report;
@@ -293,7 +320,8 @@ pub(crate) fn place_results_of_finished_job(directory: &JobDirectory) -> Result<
         let damaged = io::Error::new(ErrorKind::InvalidData, "it has changed since the job wrote it");
         return Err(Error::io("read", directory.journal())(damaged));
     }
-    directory.replace_results(&names)
+    directory.replace_results(&names, updates)?;
+    place_changes(directory)
 }
 
 /// Where a run begins.
@@ -307,7 +335,8 @@ pub(crate) struct RunStart<'a> {
 }
 
 /// Begins a run of the job with `header` in its locked directory: takes over what is the same from the earlier run if it is whole, and
-/// otherwise removes everything. `has_plan` tells whether its plan is that of this run. What tasks have done is not compared with its hashes
+/// otherwise removes everything. `has_plan` tells whether its plan is that of this run, and `is_update` whether what has not changed since
+/// stays as it is. What tasks have done is not compared with its hashes
 /// (`is_by_tasks`), because it was on the disk before others counted on it.
 ///
 /// # Errors
@@ -317,12 +346,16 @@ pub(crate) fn start<'a>(
     header: &JobHeader,
     earlier: Option<EarlierRun>,
     has_plan: bool,
+    is_update: bool,
     is_by_tasks: bool,
     progress: ProgressOutput,
 ) -> Result<RunStart<'a>> {
     let progress_of_tasks = if is_by_tasks { ProgressOutput::Quiet } else { progress };
-    let mut kept = earlier.and_then(|earlier| earlier.kept_for(header, has_plan, progress_of_tasks));
-    if let (Some(earlier), false) = (&kept, is_by_tasks) {
+    let mut kept = earlier.and_then(|earlier| match is_update {
+        true => Some(earlier.kept_for_update(header, progress)),
+        false => earlier.kept_for(header, has_plan, progress_of_tasks),
+    });
+    if let (Some(earlier), false) = (&kept, is_by_tasks || is_update) {
         let stage = progress.stage("check", earlier.parts.len(), "phases");
         let mut files = earlier.entries.iter().flat_map(|entry| &entry.files);
         let of_job = files.try_fold(true, |all, file| Ok::<_, Error>(all && file.try_is_whole(directory)?))?;
@@ -342,7 +375,9 @@ pub(crate) fn start<'a>(
         return Ok(RunStart { journal, job_id: header.id, resumed: 0 });
     };
     let resumed = entries.len() as u64 + parts.len();
-    if resumed > 0 {
+    if is_update {
+        directory.keep_results(&parts.files().map(|file| file.name.clone()).collect())?;
+    } else if resumed > 0 {
         progress_of_tasks.note(&format!("going on with an interrupted run; phases complete: {resumed}"));
     }
     // Only a plan that stays calls the inputs what they were called.

@@ -11,4 +11,5 @@ pub(crate) mod part_entries;
 pub(crate) mod phases;
 pub(crate) mod single_process;
 pub(crate) mod tasks;
+pub(crate) mod update;
 pub(crate) mod whole_run;

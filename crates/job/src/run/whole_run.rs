@@ -48,7 +48,8 @@ impl<'a> WholeRun<'a> {
             threads: self.threads,
             clock: self.clock,
             id: self.job_id,
-            checks_points: self.resumed > 0,
+            // What an update needs was brought to the disk before its phase was complete.
+            checks_points: self.resumed > 0 && !plan.options.updates,
             is_task: false,
         }
     }

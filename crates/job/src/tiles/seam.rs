@@ -21,5 +21,6 @@ pub(crate) fn seam_of(store: &Store, tree: &Tree, finished: FinishedTile) -> Res
     for node in tree.merges_above(leaf).take_while(|&node| node >= last_merge) {
         seam.add(Seam::touching(store, node, tile)?);
     }
+    seam.sort();
     Ok(seam)
 }

@@ -17,9 +17,11 @@ use crate::run::phases::part_store::{OpenPart, PartStores};
 use crate::run::phases::tile_queue::TileAppearance;
 use crate::tiles::dependencies::FinishedTile;
 use crate::tiles::seam::seam_of;
+use serde::de::IgnoredAny;
 use std::sync::Arc;
 use sys::Result;
 use tiles::options::MaxEdge;
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 /// The merges above the parts, done.
 pub(crate) struct JoinedParts {
@@ -30,6 +32,8 @@ pub(crate) struct JoinedParts {
     pub(crate) stages: Vec<StageStats>,
     /// The largest resident set of the process that merged, in bytes.
     pub(crate) peak_memory: Option<u64>,
+    /// In a job that is to be updated, what tells the rule for long triangles from others.
+    key_of_rule: u64,
 }
 
 /// Tells whether there is anything to do once all parts are meshed.
@@ -46,7 +50,7 @@ pub(crate) fn join_parts(job: &Job, stores: &PartStores, all: SitesOfParts) -> c
         return Ok(());
     }
     let directory = &job.directory.join();
-    once(job, directory, job.above(), JobStep::Join, |folder| {
+    once(job, directory, job.above(), JobStep::Join, key_of_meshes(job)?, |folder| {
         let parts = job.parts.all().len() as u64;
         let stage = job.progress.stage("join", parts, "parts");
         merge_below(job, stores, folder, NodeIndex::ROOT)?;
@@ -55,6 +59,21 @@ pub(crate) fn join_parts(job: &Job, stores: &PartStores, all: SitesOfParts) -> c
         Ok(folder.record(JobStep::Join, all, vec![stage.finish()])?)
     })
     .map(|_| ())
+}
+
+/// Returns what tells the meshes of all parts from others, in a job that is to be updated; else 0.
+fn key_of_meshes(job: &Job) -> Result<u64> {
+    if !job.plan.options.updates {
+        return Ok(0);
+    }
+    let mut keys = Vec::new();
+    for part in job.parts.all() {
+        let entries = entries_of(&job.directory.part(part), job.header(part))?;
+        if let Some(mesh) = entries.iter().find(|entry| entry.step == JobStep::Mesh) {
+            keys.push(mesh.figures::<Done<IgnoredAny>>()?.key);
+        }
+    }
+    Ok(xxh3_64(bytemuck::cast_slice(&keys)))
 }
 
 /// Merges at those nodes above the parts for which only part `last` was missing: all parts before it are meshed. Returns the tiles that
@@ -128,7 +147,13 @@ impl JoinedParts {
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on its folder.
     pub(crate) fn open(job: &Job) -> Result<Option<JoinedParts>> {
         if let (false, Some(appearance)) = (is_needed(job), early_appearance(job)?) {
-            return Ok(Some(JoinedParts { store: None, appearance, stages: Vec::new(), peak_memory: None }));
+            return Ok(Some(JoinedParts {
+                store: None,
+                appearance,
+                stages: Vec::new(),
+                peak_memory: None,
+                key_of_rule: 0,
+            }));
         }
         let directory = job.directory.join();
         let entries = entries_of(&directory, job.header(job.above()))?;
@@ -142,7 +167,9 @@ impl JoinedParts {
             return Err(sys::Error::Broken(format!("the seam of node {node} above the parts is gone")));
         }
         let appearance = final_appearance(job, all, &store)?;
-        Ok(Some(JoinedParts { store: Some(store), appearance, stages, peak_memory }))
+        let rule = if job.plan.options.updates { format!("{:?}", appearance.style.max_edge) } else { String::new() };
+        let key_of_rule = xxh3_64(rule.as_bytes());
+        Ok(Some(JoinedParts { store: Some(store), appearance, stages, peak_memory, key_of_rule }))
     }
 
     /// Returns what is merged while parts are still to come.
@@ -154,7 +181,7 @@ impl JoinedParts {
         let entries = entries_of(&directory, job.header(job.above()))?;
         let records = records_of(&entries).into_values();
         let store = is_needed(job).then(|| open_store(&directory, records)).transpose()?;
-        Ok(JoinedParts { store, appearance, stages: Vec::new(), peak_memory: None })
+        Ok(JoinedParts { store, appearance, stages: Vec::new(), peak_memory: None, key_of_rule: 0 })
     }
 
     /// Returns what all seams have of `tile` of the part with `store` and `tree`.
@@ -169,7 +196,27 @@ impl JoinedParts {
         for node in above.take_while(|node| joined.has(StepRecord::Seam(*node))) {
             seam.add(Seam::touching(joined, node, tile)?);
         }
+        seam.sort();
         Ok(seam)
+    }
+
+    /// Returns what tells that which merges above the parts have of `tile` from what others would have, and the rule for long triangles
+    /// from others.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store.
+    pub(crate) fn key_of_tile(&self, job: &Job, tile: TileIndex) -> Result<u64> {
+        let mut seam = SeamOfTile::default();
+        if let Some(joined) = &self.store {
+            let above = job.parts.tree.merges_above(job.parts.node(tile.part()));
+            above.into_iter().try_for_each(|node| Seam::touching(joined, node, tile).map(|found| seam.add(found)))?;
+        }
+        seam.sort();
+        let mut hasher = Xxh3::with_seed(self.key_of_rule);
+        hasher.update(&seam.triangles.len().to_le_bytes());
+        hasher.update(bytemuck::cast_slice(&seam.triangles));
+        hasher.update(bytemuck::cast_slice(&seam.trimmed));
+        Ok(hasher.digest())
     }
 
     /// Returns how many slivers along the hull the whole mesh has.

@@ -1,5 +1,6 @@
 //! Step 7: the coarser tiles of a part, and those above the parts.
 
+use crate::durable::journal::PublishedFile;
 use crate::index::PartIndex;
 use crate::levels::hierarchy::{Hierarchy, LevelSizes};
 use crate::levels::make_level::{LevelContext, LevelStats, TopOf, level_memory, make_level};
@@ -8,12 +9,14 @@ use crate::plan::job_plan::Plan;
 use crate::records::JobStep;
 use crate::run::folder::{Folder, once};
 use crate::run::job::Job;
+use crate::run::part_entries::entries_of;
 use crate::run::phases::join::JoinedParts;
 use crate::run::phases::part_store::PartStores;
 use crate::tiles::style::TileStyle;
 use rayon::prelude::*;
 use sys::threads::on_threads;
 use sys::{Error, Result, interrupt};
+use xxhash_rust::xxh3::Xxh3;
 
 /// Makes the coarser tiles of `part`, unless that is done. If viewers get none, because the job has no tileset, notes that.
 ///
@@ -27,7 +30,7 @@ pub(crate) fn levels_of_part(
     has_tileset: bool,
 ) -> crate::Result<LevelStats> {
     let directory = &job.directory.part(part);
-    once(job, directory, part, JobStep::Levels, |folder| {
+    once(job, directory, part, JobStep::Levels, key_of_tiles(job, &[part])?, |folder| {
         let open = stores.open(part)?;
         // The store of the part grows, so what is open now must not be used again.
         stores.close(part);
@@ -38,6 +41,27 @@ pub(crate) fn levels_of_part(
         let no_other = |other: PartIndex| Err(Error::Broken(format!("part {part} has no tile of part {other}")));
         make_levels(job, folder, part, &hierarchy, &joined.appearance.style, &no_other)
     })
+}
+
+/// Returns what tells the tiles of these parts from others, in a job that is to be updated; else 0.
+///
+/// # Errors
+/// [`Error::Io`] if a journal cannot be read.
+pub(crate) fn key_of_tiles(job: &Job, parts: &[PartIndex]) -> Result<u64> {
+    if !job.plan.options.updates {
+        return Ok(0);
+    }
+    let mut hasher = Xxh3::new();
+    for &part in parts {
+        let entries = entries_of(&job.directory.part(part), job.header(part))?;
+        let mut files: Vec<&PublishedFile> =
+            entries.iter().filter(|entry| entry.step == JobStep::Tiles).flat_map(|entry| &entry.files).collect();
+        files.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+        for file in files {
+            hasher.update(format!("{} {}\n", file.name.display(), file.checksum).as_bytes());
+        }
+    }
+    Ok(hasher.digest())
 }
 
 /// Returns how large the coarser tiles of a job are to be.

@@ -2,6 +2,8 @@
 //! finished.
 
 use crate::Result;
+use crate::durable::atomic_file::remove_file;
+use crate::durable::directory::JobDirectory;
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::mesh::leaf::LeafStats;
 use crate::partition::point_file::PointFiles;
@@ -12,7 +14,7 @@ use crate::run::folder::{Folder, once};
 use crate::run::job::Job;
 use crate::run::phases::meshed_part::{MeshedPart, SomeTiles};
 use crate::run::phases::postponed_merges::PostponedMerges;
-use crate::run::phases::select_phase::vertices_of;
+use crate::run::phases::select_phase::{key_of_vertices, vertices_of};
 use crate::run::phases::tile_queue::{TileAppearance, TileQueue};
 use crate::run::phases::tree_walk::TreeWalk;
 use std::collections::HashSet;
@@ -30,8 +32,12 @@ pub(crate) fn mesh_one(
     others: Option<u64>,
 ) -> Result<MeshedPart> {
     let directory = &job.directory.part(part);
-    let meshed = once(job, directory, part, JobStep::Mesh, |folder| mesh(job, folder, part, appearance, others))?;
-    directory.remove_points()?;
+    let key = key_of_vertices(job, part)?;
+    let meshed = once(job, directory, part, JobStep::Mesh, key, |folder| mesh(job, folder, part, appearance, others))?;
+    match job.plan.options.updates {
+        true => remove_divided_points(job, directory)?,
+        false => directory.remove_points()?,
+    }
     Ok(meshed)
 }
 
@@ -69,6 +75,13 @@ fn mesh(
     }
     folder.record_all(entries)?;
     Ok(meshed.figures)
+}
+
+/// Removes the points of a part that no reader has written: those of crowded buckets, which are divided again, and the selected ones.
+fn remove_divided_points(job: &Job, directory: &JobDirectory) -> sys::Result<()> {
+    let readers = job.parts.all().len();
+    let written = directory.point_files()?.into_iter().filter(|(number, _)| usize::from(*number) >= readers);
+    written.into_iter().try_for_each(|(_, path)| remove_file(&path))
 }
 
 /// Parts the records that hold for any style from those of tiles that are written.

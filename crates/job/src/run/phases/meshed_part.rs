@@ -35,6 +35,20 @@ pub(crate) struct SomeTiles {
     pub(crate) written: Vec<TileIndex>,
     /// Tiles whose borders are finished, each with the tiles that must be finished before it can be written.
     pub(crate) with_border: Vec<(TileIndex, Vec<TileIndex>)>,
+    /// In a job that is to be updated, what is known of each tile that has waited for other parts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) waited: Vec<WaitedTile>,
+}
+
+/// What is known of a written tile that merges above its part may have changed, or whose neighbours they may.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct WaitedTile {
+    pub(crate) tile: TileIndex,
+    pub(crate) stats: TileStats,
+    /// Tells what these merges have of the tile from what others would have.
+    pub(crate) key: u64,
+    /// The tiles whose borders it shows.
+    pub(crate) neighbours: Vec<TileIndex>,
 }
 
 impl SomeTiles {
@@ -43,6 +57,7 @@ impl SomeTiles {
         self.stats += later.stats;
         self.written.extend(later.written);
         self.with_border.extend(later.with_border);
+        self.waited.extend(later.waited);
     }
 }
 

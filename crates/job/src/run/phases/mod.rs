@@ -41,6 +41,8 @@ use crate::run::phases::read_phase::{read_for, sum_up};
 use crate::run::phases::select_phase::{select_vertices, selects};
 use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
 use crate::run::phases::waiting_tiles::WaitingTiles;
+use crate::run::update::first_plan_file::keep_first_plan;
+use crate::run::update::outdated_tiles::forget_outdated_tiles;
 use crate::run::whole_run::WholeRun;
 use crate::tiles::write_tile::TileStats;
 
@@ -54,12 +56,16 @@ pub(crate) fn do_phases(run: &WholeRun, plan: Plan) -> Result<Report> {
     let plan = &settled(run, plan)?;
     let parts = &Parts::of(plan);
     let job = &run.job(plan, parts);
+    if parts.all().len() > 1 {
+        keep_first_plan(run.directory, plan)?;
+    }
     // Steps 2 to 6 for each part, as far as it needs no later one.
     let stores = &PartStores::new(job);
     let all = read_and_mesh(job, stores)?;
     // Step 4 for the nodes above the parts.
     join_parts(job, stores, all)?;
     let joined = JoinedParts::open(job)?.ok_or_else(|| sys::Error::Broken("the parts are not joined".into()))?;
+    forget_outdated_tiles(job, stores, &joined)?;
     // Steps 5 and 6 for the tiles that have waited.
     let borders = &ForeignBorders::new(job, stores, &joined);
     let mut tiles = TileStats::default();
@@ -93,7 +99,9 @@ fn read_and_mesh(job: &Job, stores: &PartStores) -> Result<SitesOfParts> {
         select_vertices(job)?;
     }
     let appearance = early_appearance(job)?;
-    let mut front = appearance.clone().map(|appearance| WaitingTiles::new(job, stores, appearance));
+    // A job that is to be updated keeps everything, and compares the tiles that wait with those of its last run.
+    let waits = appearance.clone().filter(|_| !job.plan.options.updates);
+    let mut front = waits.map(|appearance| WaitingTiles::new(job, stores, appearance));
     for part in job.parts.all() {
         if !selects {
             read_next(part, &mut read, &mut waiting)?;

@@ -1,6 +1,6 @@
 //! Step 8: the coarser tiles above the parts, what is beside the tiles, and the report.
 
-use crate::durable::atomic_file::{PendingFile, write_pending};
+use crate::durable::atomic_file::write_pending;
 use crate::durable::journal::PublishedFile;
 use crate::index::{PartIndex, TileIndex};
 use crate::levels::hierarchy::Hierarchy;
@@ -26,16 +26,17 @@ use crate::records::{JobStep, Store};
 use crate::report::job_report::{Report, ReportParts, SlowestPart};
 use crate::report::selection_report::SelectionReport;
 use crate::run::done::Done;
-use crate::run::folder::Folder;
+use crate::run::folder::{Folder, done_with};
 use crate::run::job::Job;
 use crate::run::part_entries::PartJournals;
 use crate::run::phases::join::JoinedParts;
-use crate::run::phases::level_phase::{hierarchy_of, left_out_warning, level_sizes, make_levels};
+use crate::run::phases::level_phase::{hierarchy_of, key_of_tiles, left_out_warning, level_sizes, make_levels};
 use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::part_store::PartStores;
 use crate::run::phases::read_phase::sum_up;
 use crate::run::phases::select_phase::{SelectedPart, found_ground};
 use crate::run::phases::tile_queue::TileAppearance;
+use crate::run::update::changes::write_changes;
 use crate::run::whole_run::WholeRun;
 use crate::tiles::style::TileStyle;
 use crate::tiles::write_tile::TileStats;
@@ -45,7 +46,7 @@ use points::PointCounts;
 use serde::de::IgnoredAny;
 use std::path::Path;
 use sys::{Error, Result, Warnings};
-use tiles::checksums::list_text;
+use tiles::checksums::{Checksum, list_text};
 use tiles::color::Coloring;
 use tiles::frame::Frame;
 use tiles::options::{Hull, MaxError, OutputFormat};
@@ -80,7 +81,11 @@ pub(crate) fn publish_job(
         peak_memory,
         cpu_s: if figures.by_tasks { processor_seconds(&parts) } else { 0.0 },
     };
-    Ok(write_report(run, job, summary.counts, figures, costs, published)?)
+    let list = list_of_files(run)?;
+    if job.plan.options.updates {
+        write_changes(run.directory, &job.plan.lattice, tiles, &list)?;
+    }
+    Ok(write_report(run, job, summary.counts, figures, costs, published, &list)?)
 }
 
 /// What the phases of parts took.
@@ -169,12 +174,14 @@ fn levels_and_root(
         root_of_part(job, stores, PartIndex::FIRST)?
     } else {
         let directory = &job.directory.join();
-        let folder = Folder::open(job, directory, job.above())?;
+        let key = key_of_tiles(job, &job.parts.all().collect::<Vec<PartIndex>>())?;
+        let done = done_with(job, directory, job.above(), JobStep::Levels, key)?;
+        let folder = Folder::open(job, directory, job.above())?.with_key(key);
         let top_of = |part: PartIndex| {
             let open = stores.open(part)?;
             Child::top(job.directory, &open.store, &open.partition.tree)
         };
-        levels += match folder.done(JobStep::Levels)? {
+        levels += match done {
             Some(done) => done,
             None => make_levels(job, &folder, tree.part, &hierarchy, &joined.appearance.style, &top_of)?,
         };
@@ -462,8 +469,9 @@ fn write_report(
     figures: PartFigures,
     costs: CostsOfParts,
     published: Published,
+    list: &[(String, Checksum)],
 ) -> Result<Report> {
-    let list = write_file_list(run)?;
+    let list = write_pending(&run.directory.output().checksums(), list_text(list).as_bytes())?;
     let of_all = figures.selected.first().and_then(|part| part.all);
     let selection = match (of_all, job.plan.options.output.max_error) {
         (Some(selected), MaxError::Units(bound)) => Some(SelectionReport::new(job.plan, bound, &selected)),
@@ -511,15 +519,14 @@ fn write_report(
     Ok(report)
 }
 
-/// Writes the list of all results so far.
-fn write_file_list(run: &WholeRun) -> Result<PendingFile> {
-    let (directory, output) = (run.directory, run.directory.output());
+/// Returns the names and checksums of all results so far, in the order of their names.
+fn list_of_files(run: &WholeRun) -> Result<Vec<(String, Checksum)>> {
+    let directory = run.directory;
     let of_parts = PartJournals::of(directory, run.job_id)?;
     let mut files: Vec<PublishedFile> = run.journal.files().into_iter().chain(of_parts.files().cloned()).collect();
     files.retain(|file| directory.is_result(&file.name));
     files.sort_by(|a, b| a.name.cmp(&b.name));
-    let files: Vec<_> = files.into_iter().map(|file| (slashed(&file.name), file.checksum)).collect();
-    write_pending(&output.checksums(), list_text(&files).as_bytes())
+    Ok(files.into_iter().map(|file| (slashed(&file.name), file.checksum)).collect())
 }
 
 /// Returns a path with slashes on every system.

@@ -12,6 +12,7 @@ use crate::run::done::Done;
 use crate::run::folder::once;
 use crate::run::job::Job;
 use crate::run::part_entries::{entries_of, open_store};
+use crate::run::update::outdated::forget_from;
 use crate::{Error, Result};
 use delaunay::geometry::Bounds;
 
@@ -21,12 +22,16 @@ use delaunay::geometry::Bounds;
 /// Those of [`read_inputs`]; [`Error::InUse`] if another process has the folder.
 pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<ReadInputs> {
     let Job { plan, parts, .. } = *job;
-    let inputs = parts.new_inputs(reader);
+    let (inputs, directory) = (parts.new_inputs(reader), &job.directory.part(reader));
     if inputs.is_empty() {
+        if plan.options.updates
+            && entries_of(directory, job.header(reader))?.iter().any(|entry| entry.step == JobStep::Read)
+        {
+            forget_from(job, directory, reader, JobStep::Read)?;
+        }
         return Ok(ReadInputs::default());
     }
-    let directory = &job.directory.part(reader);
-    once(job, directory, reader, JobStep::Read, |folder| {
+    once(job, directory, reader, JobStep::Read, plan.key_of_inputs(inputs), |folder| {
         let records = inputs.iter().map(|&input| plan.inputs[input].source.records).sum();
         let stage = job.progress.stage("read", records, "points");
         let (read, blocks) = read_inputs(plan, parts, job.directory, reader, malformed, job.syncs(), &stage)?;
@@ -62,7 +67,10 @@ pub(crate) fn points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPa
 /// [`Error::TooFine`] if no mesh can hold the heights.
 pub(crate) fn sum_up<'a>(job: &Job, read: impl Iterator<Item = &'a ReadInputs>) -> Result<(PointSummary, Bounds<3>)> {
     let mut read: Vec<ReadInputs> = read.cloned().collect();
-    read.iter_mut().for_each(|inputs| inputs.rename_inputs(job.plan));
+    for inputs in &mut read {
+        inputs.renumber_inputs(job.parts);
+        inputs.rename_inputs(job.plan);
+    }
     check_malformed(job.plan, read.iter())?;
     let mut summary = PointSummary::default();
     read.into_iter().for_each(|inputs| summary += inputs.summary);

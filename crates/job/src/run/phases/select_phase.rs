@@ -15,11 +15,14 @@ use crate::run::folder::Folder;
 use crate::run::job::Job;
 use crate::run::part_entries::{entries_of, open_store};
 use crate::run::phases::read_phase::points_of;
+use crate::run::update::outdated::forget_from;
 use crate::{Error, Result};
 use delaunay::geometry::Site;
 use ground::{Ground, GroundColumns};
 use selection::{Figures, Selection, select};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// What is known of a part once its vertices are selected.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -34,6 +37,8 @@ pub(crate) struct SelectedPart {
     pub(crate) temporary: u64,
     /// The number of blocks that the selected points of this part are in.
     blocks: u64,
+    /// Tells the selected points from others, in a job that is to be updated.
+    digest: u64,
 }
 
 /// Tells whether the job has the phase.
@@ -48,15 +53,24 @@ pub(crate) fn selects(plan: &Plan) -> bool {
 /// [`sys::Error::Config`] if the memory does not hold the selection.
 pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     let bound = error_bound(job.plan)?;
+    let key = key_of_all_points(job)?;
     let is_done = |part| {
-        Ok(entries_of(&job.directory.part(part), job.header(part))?.iter().any(|entry| entry.step == JobStep::Select))
+        let entries = entries_of(&job.directory.part(part), job.header(part))?;
+        let done = entries.iter().find(|entry| entry.step == JobStep::Select);
+        match done.map(|entry| entry.figures::<Done<IgnoredAny>>()).transpose()? {
+            Some(done) if done.key != key => {
+                forget_from(job, &job.directory.part(part), part, JobStep::Select)?;
+                Ok(false)
+            }
+            done => Ok(done.is_some()),
+        }
     };
-    if job.parts.all().map(is_done).collect::<sys::Result<Vec<bool>>>()?.into_iter().all(|is_done| is_done) {
+    if job.parts.all().map(is_done).collect::<Result<Vec<bool>>>()?.into_iter().all(|is_done| is_done) {
         return know_selection(job);
     }
     let directories: Vec<JobDirectory> = job.parts.all().map(|part| job.directory.part(part)).collect();
     // The lock of the first part is that of the phase: no other phase goes on before this one is done.
-    let first = Folder::open(job, &directories[0], PartIndex::FIRST)?;
+    let first = Folder::open(job, &directories[0], PartIndex::FIRST)?.with_key(key);
     let stage = job.progress.stage("select", job.plan.decoded_records(), "points");
     let memory = working_memory(&job.plan.options);
     let per_block = points_per_block(job.plan.decoded_records(), memory, job.threads);
@@ -83,12 +97,13 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     let mut stage = Some(stage);
     let mut temporary = parts.iter().map(|part| part.partition.point_bytes).sum();
     for (number, PartInBlocks { part, .. }) in parts.iter().enumerate() {
-        let other = if number == 0 { None } else { Some(Folder::open(job, &directories[number], *part)?) };
+        let other =
+            if number == 0 { None } else { Some(Folder::open(job, &directories[number], *part)?.with_key(key)) };
         let folder = other.as_ref().unwrap_or(&first);
         if folder.done::<SelectedPart>(JobStep::Select)?.is_some() {
             continue;
         }
-        let WrittenPoints { blocks, wanted, duplicates } =
+        let WrittenPoints { blocks, wanted, duplicates, digest } =
             source.write_selected(number, sites.as_ref(), job.parts, &directories[number], job.syncs())?;
         blocks.save_as(&folder.store, StepRecord::Selected)?;
         if number == 0 {
@@ -99,13 +114,22 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
             }
         }
         temporary += blocks.bytes();
-        let selected = SelectedPart { all: figures, wanted, duplicates, temporary, blocks: blocks.len() };
+        let (blocks, digest) = (blocks.len(), digest);
+        let selected = SelectedPart { all: figures, wanted, duplicates, temporary, blocks, digest };
         let is_last = number + 1 == parts.len();
         let stages = stage.take_if(|_| is_last).map(|stage| stage.finish()).into_iter().collect();
         folder.record(JobStep::Select, selected, stages)?;
     }
     job.plan.on_ground.set(on_ground);
     Ok(())
+}
+
+/// Returns what tells the points of all parts from others, in a job that is to be updated; else 0.
+fn key_of_all_points(job: &Job) -> Result<u64> {
+    if !job.plan.options.updates {
+        return Ok(0);
+    }
+    job.parts.all().try_fold(0u64, |all, part| Ok(all.wrapping_add(points_of(job, part)?.digest())))
 }
 
 /// Tells the plan what the selection has found, if it is done. Later phases of jobs that have one fail without.
@@ -135,6 +159,31 @@ pub(crate) fn found_ground(job: &Job) -> sys::Result<Ground> {
     let ground =
         GroundColumns { numbers: columns.column_vec()?, places: columns.column_vec()?, heights: columns.column_vec()? };
     Ground::of_columns(ground).ok_or_else(|| sys::Error::Broken("the ground has no heights".into()))
+}
+
+/// Returns what tells the vertices of a part from others, in a job that is to be updated; else 0.
+///
+/// # Errors
+/// As [`vertices_of`].
+pub(crate) fn key_of_vertices(job: &Job, part: PartIndex) -> Result<u64> {
+    if !job.plan.options.updates {
+        return Ok(0);
+    }
+    if !selects(job.plan) {
+        return Ok(points_of(job, part)?.digest());
+    }
+    let entries = entries_of(&job.directory.part(part), job.header(part))?;
+    let selected = entries.iter().find(|entry| entry.step == JobStep::Select);
+    let selected =
+        selected.ok_or_else(|| sys::Error::Broken(format!("the vertices of part {part} are not selected")))?;
+    let vertices = selected.figures::<Done<SelectedPart>>()?.figures.digest;
+    let is_of_part = |triangle: &&[Site; 3]| {
+        triangle.iter().any(|&site| job.parts.part_of(job.parts.grid.bucket(site) as usize) == part)
+    };
+    let on_ground = job.plan.on_ground.get().into_iter().flat_map(|known| {
+        known.iter().filter(is_of_part).map(|triangle| xxh3_64(bytemuck::bytes_of(triangle))).collect::<Vec<u64>>()
+    });
+    Ok(on_ground.fold(vertices, u64::wrapping_add))
 }
 
 /// Returns the points of a part that are vertices: all, or those that are selected. `store` is that of the part.

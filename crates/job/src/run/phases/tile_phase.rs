@@ -10,7 +10,7 @@ use crate::records::{FinishedBorder, JobStep, StepRecord, Store};
 use crate::run::folder::Folder;
 use crate::run::job::Job;
 use crate::run::phases::join::JoinedParts;
-use crate::run::phases::meshed_part::SomeTiles;
+use crate::run::phases::meshed_part::{SomeTiles, WaitedTile};
 use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::part_store::{OpenPart, PartStores};
 use crate::run::phases::tile_queue::TileAppearance;
@@ -33,18 +33,30 @@ pub(crate) fn finish_part(borders: &ForeignBorders, part: PartIndex) -> crate::R
     }
     let session = BorderSession::open(borders, directory, part, progress.tiles_left())?;
     // What another process has written since is in the journal that is locked now.
-    let SomeTiles { stats: mut all, written, with_border } = session.open.tiles.clone();
-    let (written, with_border): (HashSet<TileIndex>, HashSet<TileIndex>) =
-        (written.into_iter().collect(), with_border.into_iter().map(|(tile, _)| tile).collect());
+    let SomeTiles { stats: mut all, written, with_border, .. } = session.open.tiles.clone();
+    let written: HashSet<TileIndex> = written.into_iter().collect();
+    let mut with_border: HashMap<TileIndex, Vec<TileIndex>> = with_border.into_iter().collect();
     let waiting: Vec<TileIndex> = session.partition().tree.tiles().filter(|tile| !written.contains(tile)).collect();
     if waiting.is_empty() {
         return Ok(all);
     }
-    let missing: Vec<TileIndex> = waiting.iter().copied().filter(|tile| !with_border.contains(tile)).collect();
-    session.finish_borders(&missing)?;
-    let stats = session.write_tiles(&waiting)?;
+    let missing: Vec<TileIndex> = waiting.iter().copied().filter(|tile| !with_border.contains_key(tile)).collect();
+    with_border.extend(session.finish_borders(&missing)?);
+    let each = session.write_each(&waiting)?;
+    let stats = sum_of(each.iter().copied());
     all += stats;
-    session.finish(SomeTiles { stats, written: waiting, with_border: Vec::new() })?;
+    let waited = match job.plan.options.updates {
+        true => waiting
+            .par_iter()
+            .zip(each)
+            .map(|(&tile, stats)| {
+                let neighbours = with_border.get(&tile).cloned().unwrap_or_default();
+                Ok(WaitedTile { tile, stats, key: borders.joined.key_of_tile(job, tile)?, neighbours })
+            })
+            .collect::<Result<_>>()?,
+        false => Vec::new(),
+    };
+    session.finish(SomeTiles { stats, written: waiting, with_border: Vec::new(), waited })?;
     Ok(all)
 }
 
@@ -110,6 +122,11 @@ impl<'a> BorderSession<'a> {
     /// # Errors
     /// Those of [`write_tile`].
     pub(crate) fn write_tiles(&self, tiles: &[TileIndex]) -> Result<TileStats> {
+        self.write_each(tiles).map(|each| sum_of(each.into_iter()))
+    }
+
+    /// Writes `tiles`, whose borders are finished. Returns the figures of each.
+    fn write_each(&self, tiles: &[TileIndex]) -> Result<Vec<TileStats>> {
         let TileAppearance { style, canvas } = &*self.borders.joined.appearance;
         let border_of = |other: TileIndex| match other.part() == self.part {
             true => FinishedBorder::load(self.store(), other),
@@ -123,11 +140,7 @@ impl<'a> BorderSession<'a> {
             self.stage.advance(1);
             Ok(stats)
         };
-        let add = |mut a: TileStats, b| {
-            a += b;
-            Ok(a)
-        };
-        tiles.par_iter().map(write).try_reduce(TileStats::default, add)
+        tiles.par_iter().map(write).collect()
     }
 
     /// Records what is written, and ends the session. Returns the bytes that the part's store keeps.
@@ -138,6 +151,13 @@ impl<'a> BorderSession<'a> {
         self.folder.record(JobStep::Tiles, some, vec![self.stage.finish()])?;
         Ok(self.folder.store.bytes())
     }
+}
+
+fn sum_of(each: impl Iterator<Item = TileStats>) -> TileStats {
+    each.fold(TileStats::default(), |mut sum, stats| {
+        sum += stats;
+        sum
+    })
 }
 
 /// How many borders of other parts stay in memory, some ten kilobytes each.

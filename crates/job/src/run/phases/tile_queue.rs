@@ -144,7 +144,8 @@ impl<'a> TileQueue<'a> {
         let open = self.partition.tree.tiles().zip(finished).filter(|(_, finished)| !finished).map(|(tile, _)| tile);
         // The journal must not depend on the order in which threads end.
         written.sort_unstable();
-        Ok((SomeTiles { stats, written, with_border: with_border.into_iter().collect() }, open.collect()))
+        let with_border = with_border.into_iter().collect();
+        Ok((SomeTiles { stats, written, with_border, waited: Vec::new() }, open.collect()))
     }
 
     /// Finishes the border normals of a tile and returns the tiles that can be written now.

@@ -112,7 +112,7 @@ fn write_ready(session: &BorderSession, waiting: &mut TilesBefore, open: &HashSe
     let written = waiting.iter().filter(|(_, before)| is_ready(before)).map(|(tile, _)| *tile);
     let written: Vec<TileIndex> = written.collect();
     written.iter().for_each(|tile| _ = waiting.remove(tile));
-    Ok(SomeTiles { stats: session.write_tiles(&written)?, written, with_border })
+    Ok(SomeTiles { stats: session.write_tiles(&written)?, written, with_border, waited: Vec::new() })
 }
 
 /// Gives up what `written` tiles needed. Once all tiles of a part are written, also what else no phase needs any more: all but the borders of

@@ -79,7 +79,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     }
     single_process::remove_notes(directory)?;
     on_threads(threads, || {
-        let start = start(directory, &header, earlier, has_plan, false, run.progress)?;
+        let start = start(directory, &header, earlier, has_plan, false, false, run.progress)?;
         if !has_plan {
             write_plan(&start.journal, directory, plan)?;
         }

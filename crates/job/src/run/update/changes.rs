@@ -1,0 +1,113 @@
+//! `update.json`: which results of an update are other than those of the run before it, for a web server or a cache.
+
+use crate::durable::atomic_file::{partial_path, publish, write_pending};
+use crate::durable::directory::JobDirectory;
+use crate::publish::side_files::EachTile;
+use crate::records::{StepRecord, Store, TileSummary};
+use lattice::Lattice;
+use rust_decimal::prelude::ToPrimitive;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
+use std::path::Path;
+use sys::{Error, Result, disk};
+use tiles::checksums::{Checksum, parse_list, read_file};
+
+/// What has changed. Paths are from the output directory, with slashes.
+#[derive(Debug, PartialEq, Serialize)]
+struct Changes {
+    /// Results that were there before and hold something else now.
+    changed: Vec<String>,
+    /// Results that were not there.
+    added: Vec<String>,
+    /// Results that are no longer there.
+    removed: Vec<String>,
+    /// The rectangles of the exact tiles among those that are changed or added: xmin, ymin, xmax, ymax in the units of the points.
+    areas: Vec<[f64; 4]>,
+}
+
+/// Writes what has changed since the results that are in place, if there are some. It waits in the job directory. `new` is the list of all
+/// results.
+///
+/// # Errors
+/// [`Error::Io`] on the lists or the stores of the parts.
+pub(crate) fn write_changes(
+    directory: &JobDirectory,
+    lattice: &Lattice,
+    tiles: &dyn EachTile,
+    new: &[(String, Checksum)],
+) -> Result<()> {
+    let Some(old) = list_in(&directory.results().checksums())? else { return Ok(()) };
+    let mut changes = Changes::between(&old, new);
+    let other: BTreeSet<&String> = changes.changed.iter().chain(&changes.added).collect();
+    let mut areas = Vec::new();
+    tiles.visit(&mut |store: &Store, tile| {
+        let name = directory.name(&directory.output().tile(tile.number()));
+        if other.iter().any(|changed| Path::new(changed) == name) && store.has(StepRecord::Tile(tile)) {
+            areas.extend(TileSummary::load(store, tile)?.bounds().map(|bounds| {
+                let world = |value: i32, axis: usize| {
+                    let place = lattice.offset[axis] + lattice.resolution * rust_decimal::Decimal::from(value);
+                    place.to_f64().unwrap_or(f64::NAN)
+                };
+                [world(bounds.min[0], 0), world(bounds.min[1], 1), world(bounds.max[0], 0), world(bounds.max[1], 1)]
+            }));
+        }
+        Ok(())
+    })?;
+    changes.areas = areas;
+    let path = directory.changes();
+    let text = serde_json::to_vec_pretty(&changes).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
+    write_pending(&path, &text)?;
+    publish(std::slice::from_ref(&path))
+}
+
+/// Puts the list of changes in its place, if one waits.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be put there.
+pub(crate) fn place_changes(directory: &JobDirectory) -> Result<()> {
+    let (waits, place) = (directory.changes(), directory.results().changes());
+    match disk::exists(&waits).map_err(Error::io("read", &waits))? {
+        true => disk::link(&waits, &place, &partial_path(&place)).map_err(Error::io("write", &place)),
+        false => Ok(()),
+    }
+}
+
+fn list_in(path: &Path) -> Result<Option<BTreeMap<String, Checksum>>> {
+    match read_file(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        text => Ok(parse_list(&text.map_err(Error::io("read", path))?).map(|files| files.into_iter().collect())),
+    }
+}
+
+impl Changes {
+    fn between(old: &BTreeMap<String, Checksum>, new: &[(String, Checksum)]) -> Changes {
+        let names: BTreeSet<&String> = new.iter().map(|(name, _)| name).collect();
+        let those = |is_wanted: &dyn Fn(&String, &Checksum) -> bool| {
+            let wanted = new.iter().filter(|(name, checksum)| is_wanted(name, checksum));
+            wanted.map(|(name, _)| name.clone()).collect()
+        };
+        Changes {
+            changed: those(&|name, checksum| old.get(name).is_some_and(|known| known != checksum)),
+            added: those(&|name, _| !old.contains_key(name)),
+            removed: old.keys().filter(|name| !names.contains(name)).cloned().collect(),
+            areas: Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_changed_added_or_removed() {
+        let file = |name: &str, text: &str| (name.to_string(), Checksum::of(text.as_bytes()));
+        let old = [file("tiles/000000.glb", "a"), file("tiles/000001.glb", "b"), file("tileset.json", "c")];
+        let new = [file("tiles/000000.glb", "a"), file("tiles/000002.glb", "d"), file("tileset.json", "e")];
+        let changes = Changes::between(&old.into_iter().collect(), &new);
+        let names = |names: &[&str]| names.iter().map(|name| name.to_string()).collect::<Vec<_>>();
+        let expected = [names(&["tileset.json"]), names(&["tiles/000002.glb"]), names(&["tiles/000001.glb"])];
+        assert_eq!([changes.changed, changes.added, changes.removed], expected);
+    }
+}

@@ -1,0 +1,94 @@
+//! Tiles of an update that are to be written again although their part has not changed: those that a part with another mesh touches, and the
+//! neighbours whose borders they show.
+
+use crate::Result;
+use crate::durable::atomic_file::remove_file;
+use crate::durable::directory::JobDirectory;
+use crate::index::{PartIndex, TileIndex};
+use crate::records::{JobStep, Journal, JournalEntry, StepRecord};
+use crate::run::done::Done;
+use crate::run::job::Job;
+use crate::run::part_entries::entries_of;
+use crate::run::phases::join::JoinedParts;
+use crate::run::phases::meshed_part::{SomeTiles, WaitedTile, tiles_so_far};
+use crate::run::phases::part_store::PartStores;
+use crate::tiles::write_tile::TileStats;
+use rayon::prelude::*;
+use std::collections::HashSet;
+use std::path::PathBuf;
+
+/// Takes the tiles that are outdated out of the journals of their parts, in a job that is to be updated. All parts are meshed and joined.
+///
+/// # Errors
+/// [`sys::Error::Io`] or [`sys::Error::Broken`] on a folder, [`crate::Error::InUse`] if another process has one.
+pub(crate) fn forget_outdated_tiles(job: &Job, stores: &PartStores, joined: &JoinedParts) -> Result<()> {
+    if !job.plan.options.updates {
+        return Ok(());
+    }
+    let parts: Vec<PartIndex> = job.parts.all().collect();
+    let tiles_of = |&part: &PartIndex| tiles_so_far(&entries_of(&job.directory.part(part), job.header(part))?);
+    let known = parts.par_iter().map(tiles_of).collect::<sys::Result<Vec<SomeTiles>>>()?;
+    let written: HashSet<TileIndex> = known.iter().flat_map(|tiles| &tiles.written).copied().collect();
+    let waited: Vec<&WaitedTile> = known.iter().flat_map(|tiles| &tiles.waited).collect();
+    let is_changed = |tile: &&WaitedTile| Ok((tile.tile, joined.key_of_tile(job, tile.tile)? != tile.key));
+    let judged = waited.par_iter().map(is_changed).collect::<sys::Result<Vec<(TileIndex, bool)>>>()?;
+    let changed: HashSet<TileIndex> =
+        judged.into_iter().filter(|(_, changed)| *changed).map(|(tile, _)| tile).collect();
+    // The tiles of a part with another mesh are not written yet.
+    let is_other = |tile: &TileIndex| changed.contains(tile) || !written.contains(tile);
+    for (&part, tiles) in parts.iter().zip(&known) {
+        let outdated = tiles.waited.iter().filter(|tile| is_other(&tile.tile) || tile.neighbours.iter().any(is_other));
+        let outdated: HashSet<TileIndex> = outdated.map(|tile| tile.tile).collect();
+        if !outdated.is_empty() {
+            stores.close(part);
+            forget_tiles(job, part, &outdated)?;
+        }
+    }
+    Ok(())
+}
+
+fn forget_tiles(job: &Job, part: PartIndex, outdated: &HashSet<TileIndex>) -> Result<()> {
+    let directory = job.directory.part(part);
+    let _lock = directory.lock_within()?;
+    let names: HashSet<PathBuf> = outdated.iter().flat_map(|&tile| names_of(&directory, tile)).collect();
+    let entries = entries_of(&directory, job.header(part))?.into_iter();
+    let without = |entry: JournalEntry| match entry.step {
+        JobStep::Tiles => without(entry, outdated, &names),
+        _ => Ok(entry),
+    };
+    drop(Journal::begin(&directory, &job.header(part), entries.map(without).collect::<sys::Result<Vec<_>>>()?)?);
+    // A result in its place is another link to the same file, which stays.
+    Ok(names.iter().try_for_each(|name| remove_file(&directory.file(name)))?)
+}
+
+/// Returns the names of the results of a tile.
+fn names_of(directory: &JobDirectory, tile: TileIndex) -> [PathBuf; 2] {
+    let output = directory.output();
+    [output.tile(tile.number()), output.cut_tile(tile.number())].map(|path| directory.name(&path))
+}
+
+/// Returns the entry without these tiles, whose results have these `names`.
+fn without(
+    mut entry: JournalEntry,
+    outdated: &HashSet<TileIndex>,
+    names: &HashSet<PathBuf>,
+) -> sys::Result<JournalEntry> {
+    let mut done = entry.figures::<Done<SomeTiles>>()?;
+    let SomeTiles { stats, written, waited, .. } = &mut done.figures;
+    if waited.is_empty() {
+        // The tiles that have not waited depend on no other part.
+        return Ok(entry);
+    }
+    waited.retain(|tile| !outdated.contains(&tile.tile));
+    written.retain(|tile| !outdated.contains(tile));
+    *stats = TileStats::default();
+    waited.iter().for_each(|tile| *stats += tile.stats);
+    entry.files.retain(|file| !names.contains(&file.name));
+    entry.changes.written.retain(|record| match record.key() {
+        StepRecord::FinishedBorder(tile) | StepRecord::Pixels(tile) | StepRecord::Tile(tile) => {
+            !outdated.contains(&tile)
+        }
+        _ => true,
+    });
+    entry.with_figures(&done)
+}
