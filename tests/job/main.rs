@@ -87,4 +87,5 @@ mod tampering;
 mod tasks;
 mod texts;
 mod units;
+mod updates;
 mod written;

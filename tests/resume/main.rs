@@ -29,3 +29,4 @@ mod read_errors;
 mod signals;
 mod tasks;
 mod terrain_tiles;
+mod updates;

@@ -46,6 +46,8 @@ pub enum JobStep {
     Merge(NodeIndex),
     /// Merges at all nodes above the parts, and finds out how tiles look.
     Join,
+    /// Makes some of the coarser tiles of a part, or of those above the parts, in a job that is to be updated.
+    LevelTiles,
     /// Makes the coarser tiles of a part, or those above the parts.
     Levels,
     /// Writes the raster of heights.

@@ -39,7 +39,7 @@ pub(crate) fn run_and_verify(mut options: JobOptions) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     options.output.directory = folder.path().join("out");
     // The free memory of this machine must not matter.
-    let run = RunOptions { progress: ProgressOutput::Quiet, force: true, restart: false, submission: 0 };
+    let run = RunOptions { progress: ProgressOutput::Quiet, force: true, restart: false, update: false, submission: 0 };
     let report = match job::run(&options, run) {
         Ok(report) => report,
         Err(error) => return assert_is_for_the_user(&error),

@@ -325,6 +325,14 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
         self.state().entries.iter().find(|entry| entry.step == step).map(JournalEntry::figures).transpose()
     }
 
+    /// Returns the figures of all entries of `step`.
+    ///
+    /// # Errors
+    /// As [`JournalEntry::figures`].
+    pub fn all_figures_of<T: DeserializeOwned>(&self, step: S) -> Result<Vec<T>> {
+        self.state().entries.iter().filter(|entry| entry.step == step).map(JournalEntry::figures).collect()
+    }
+
     /// Returns the number of phases that are complete.
     pub fn complete(&self) -> u64 {
         self.state().entries.len() as u64

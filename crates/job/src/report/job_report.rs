@@ -16,6 +16,7 @@ use crate::publish::map_tiles::write_map_tiles::MapTileStats;
 use crate::publish::raster::write_raster::RasterStats;
 use crate::publish::terrain_tiles::write_terrain::TerrainStats;
 use crate::report::breakline_report::BreaklineReport;
+use crate::report::change_counts::ChangeCounts;
 use crate::report::clip_report::ClipReport;
 use crate::report::selection_report::SelectionReport;
 use crate::tiles::write_tile::TileStats;
@@ -71,6 +72,9 @@ pub struct Report {
     /// The files with the mesh for CAD and other programs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exports: Vec<ExportedFile>,
+    /// How much an update has changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub update: Option<ChangeCounts>,
     /// The contour lines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contours: Option<ContourStats>,
@@ -242,6 +246,8 @@ pub struct ReportParts {
     pub contours: Option<ContourStats>,
     /// The terrain tiles for globes.
     pub terrain: Option<TerrainStats>,
+    /// How much an update has changed.
+    pub update: Option<ChangeCounts>,
     /// The number of parts.
     pub parts: u64,
     /// The part that took the longest.
@@ -315,6 +321,7 @@ impl Report {
             raster: parts.raster,
             pmtiles: parts.pmtiles,
             exports: parts.exports,
+            update: parts.update,
             contours: parts.contours,
             terrain: parts.terrain,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,

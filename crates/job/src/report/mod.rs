@@ -1,6 +1,7 @@
 //! The report of a finished job, for people and for machines.
 
 pub mod breakline_report;
+pub mod change_counts;
 pub mod clip_report;
 pub mod job_report;
 pub mod job_status;

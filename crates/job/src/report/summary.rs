@@ -1,6 +1,7 @@
 //! The end of a job in a few lines, for people: what was made, where it is, how exact it is, what to know, and what to do next.
 
 use crate::progress::number_text::{counted, grouped, precise_mebibytes};
+use crate::report::change_counts::ChangeCounts;
 use crate::report::job_report::Report;
 use crate::report::selection_report::SelectionReport;
 use crate::report::skipped_inputs::write_skipped;
@@ -102,6 +103,13 @@ impl<'a> Summary<'a> {
         format!("{bytes} in {directory}: {}{without}", files.join(", "))
     }
 
+    /// Returns how much an update has changed, if it was one.
+    fn update(&self) -> Option<String> {
+        let ChangeCounts { changed, added, removed } = self.report.update?;
+        let files = counted(changed, "file");
+        Some(format!("{files} changed, {} new, {} gone: see update.json", grouped(added), grouped(removed)))
+    }
+
     fn costs(&self) -> String {
         let Report { wall_s, cpu_s, peak_memory, memory_limit, resumed, gpu, .. } = self.report;
         let peak = peak_memory.map_or("unknown".into(), precise_mebibytes);
@@ -132,6 +140,7 @@ impl fmt::Display for Summary<'_> {
         row("exact", &self.exactness())?;
         self.left_out().map_or(Ok(()), |left_out| row("left out", &left_out))?;
         row("written", &self.files())?;
+        self.update().map_or(Ok(()), |update| row("update", &update))?;
         row("took", &self.costs())?;
         for warning in self.report.warnings.iter() {
             writeln!(f, "{}", ShownWarning(&(self.words)(warning)))?;

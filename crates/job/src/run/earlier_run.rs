@@ -188,7 +188,7 @@ impl EarlierRun {
         }
         if let Some(what) = old.and_then(|old| header.fingerprint.style_since(old)) {
             progress.note(&format!("changed since the last run: {what}; all tiles are written again"));
-            self.parts.drop_steps(&[JobStep::Tiles, JobStep::Levels, JobStep::Join]);
+            self.parts.drop_steps(&[JobStep::Tiles, JobStep::LevelTiles, JobStep::Levels, JobStep::Join]);
             self.has_dropped = true;
         }
         self.entries.clear();

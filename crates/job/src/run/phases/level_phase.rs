@@ -1,22 +1,22 @@
 //! Step 7: the coarser tiles of a part, and those above the parts.
 
-use crate::durable::journal::PublishedFile;
-use crate::index::PartIndex;
+use crate::index::{NodeIndex, PartIndex};
 use crate::levels::hierarchy::{Hierarchy, LevelSizes};
 use crate::levels::make_level::{LevelContext, LevelStats, TopOf, level_memory, make_level};
 use crate::partition::result::Partition;
 use crate::plan::job_plan::Plan;
 use crate::records::JobStep;
-use crate::run::folder::{Folder, once};
+use crate::run::done::Done;
+use crate::run::folder::{Folder, done_with, once};
 use crate::run::job::Job;
-use crate::run::part_entries::entries_of;
 use crate::run::phases::join::JoinedParts;
 use crate::run::phases::part_store::PartStores;
+use crate::run::update::outdated_levels::{MadeLevel, forget_outdated_levels, key_of_tiles, keys_of_levels};
 use crate::tiles::style::TileStyle;
 use rayon::prelude::*;
+use std::collections::HashSet;
 use sys::threads::on_threads;
 use sys::{Error, Result, interrupt};
-use xxhash_rust::xxh3::Xxh3;
 
 /// Makes the coarser tiles of `part`, unless that is done. If viewers get none, because the job has no tileset, notes that.
 ///
@@ -30,38 +30,22 @@ pub(crate) fn levels_of_part(
     has_tileset: bool,
 ) -> crate::Result<LevelStats> {
     let directory = &job.directory.part(part);
-    once(job, directory, part, JobStep::Levels, key_of_tiles(job, &[part])?, |folder| {
-        let open = stores.open(part)?;
-        // The store of the part grows, so what is open now must not be used again.
-        stores.close(part);
+    let key = key_of_tiles(job, &[part])?;
+    if let Some(done) = done_with(job, directory, part, JobStep::Levels, key)? {
+        return Ok(done);
+    }
+    let open = stores.open(part)?;
+    // The store of the part grows, so what is open now must not be used again.
+    stores.close(part);
+    let hierarchy = hierarchy_of(job.plan, &open.partition);
+    forget_outdated_levels(job, directory, part, &hierarchy)?;
+    once(job, directory, part, JobStep::Levels, key, |folder| {
         if !has_tileset {
             return Ok(folder.record(JobStep::Levels, LevelStats::default(), Vec::new())?);
         }
-        let hierarchy = hierarchy_of(job.plan, &open.partition);
         let no_other = |other: PartIndex| Err(Error::Broken(format!("part {part} has no tile of part {other}")));
         make_levels(job, folder, part, &hierarchy, &joined.appearance.style, &no_other)
     })
-}
-
-/// Returns what tells the tiles of these parts from others, in a job that is to be updated; else 0.
-///
-/// # Errors
-/// [`Error::Io`] if a journal cannot be read.
-pub(crate) fn key_of_tiles(job: &Job, parts: &[PartIndex]) -> Result<u64> {
-    if !job.plan.options.updates {
-        return Ok(0);
-    }
-    let mut hasher = Xxh3::new();
-    for &part in parts {
-        let entries = entries_of(&job.directory.part(part), job.header(part))?;
-        let mut files: Vec<&PublishedFile> =
-            entries.iter().filter(|entry| entry.step == JobStep::Tiles).flat_map(|entry| &entry.files).collect();
-        files.sort_unstable_by(|a, b| a.name.cmp(&b.name));
-        for file in files {
-            hasher.update(format!("{} {}\n", file.name.display(), file.checksum).as_bytes());
-        }
-    }
-    Ok(hasher.digest())
 }
 
 /// Returns how large the coarser tiles of a job are to be.
@@ -89,35 +73,42 @@ pub(crate) fn make_levels(
     top_of: TopOf,
 ) -> crate::Result<LevelStats> {
     let (output, sizes) = (&job.plan.options.output, level_sizes(job.plan));
-    let stage = job.progress.stage("levels", hierarchy.tiles.len() as u64, "tiles");
+    let keys = keys_of_levels(job, part, hierarchy)?;
     let Folder { directory, store, journal, .. } = folder;
+    let known: Vec<Done<Vec<MadeLevel>>> = journal.all_figures_of(JobStep::LevelTiles)?;
+    let known: Vec<MadeLevel> = known.into_iter().flat_map(|done| done.figures).collect();
+    let is_known: HashSet<NodeIndex> = known.iter().map(|made| made.node).collect();
+    let stage = job.progress.stage("levels", (hierarchy.tiles.len() - is_known.len()) as u64, "tiles");
     let context = LevelContext { directory, store, hierarchy, style, sizes, meshes: output.levels, part, top_of };
     let make = |index: usize| {
         interrupt::check()?;
         let (stats, files) = make_level(&context, index)?;
         journal.add_files(&files);
         stage.advance(1);
-        Ok::<_, Error>(stats)
-    };
-    let sum = |mut a: LevelStats, b| {
-        a += b;
-        Ok(a)
+        let (node, key) = (hierarchy.tiles[index].node, keys.get(index).copied().unwrap_or(0));
+        Ok::<_, Error>(MadeLevel { node, key, stats })
     };
     let make_all =
-        |tiles: Vec<usize>| tiles.into_par_iter().with_max_len(1).map(make).try_reduce(LevelStats::default, sum);
-    let mut stats = LevelStats::default();
-    for height in hierarchy.by_height() {
+        |tiles: Vec<usize>| tiles.into_par_iter().with_max_len(1).map(make).collect::<Result<Vec<MadeLevel>>>();
+    let mut made = Vec::new();
+    for mut height in hierarchy.by_height() {
+        height.retain(|index| !is_known.contains(&hierarchy.tiles[*index].node));
         if !output.levels {
-            stats += make_all(height)?;
+            made.extend(make_all(height)?);
             continue;
         }
         let batches = batches(&context, height, job.threads)?;
         for (tiles, threads) in batches.into_iter().filter(|(tiles, _)| !tiles.is_empty()) {
             // Threads keep the memory of the largest mesh that they have made, so each batch has its own.
-            stats += on_threads(threads, || make_all(tiles))?;
+            made.extend(on_threads(threads, || make_all(tiles))?);
         }
         // A level reads the tiles below, which must have their names.
         journal.name_files()?;
+    }
+    let mut stats = LevelStats::default();
+    known.iter().chain(&made).for_each(|made| stats += made.stats);
+    if job.plan.options.updates {
+        folder.record(JobStep::LevelTiles, made, Vec::new())?;
     }
     Ok(folder.record(JobStep::Levels, stats, vec![stage.finish()])?)
 }

@@ -1,6 +1,6 @@
 //! Step 8: the coarser tiles above the parts, what is beside the tiles, and the report.
 
-use crate::durable::atomic_file::write_pending;
+use crate::durable::atomic_file::{PendingFile, write_pending};
 use crate::durable::journal::PublishedFile;
 use crate::index::{PartIndex, TileIndex};
 use crate::levels::hierarchy::Hierarchy;
@@ -23,6 +23,7 @@ use crate::publish::side_files::{EachTile, SideFiles, StoredTiles, write_side_fi
 use crate::publish::terrain_tiles::write_terrain::{TerrainStats, TerrainWork};
 use crate::publish::tileset_tree::TilesOfTree;
 use crate::records::{JobStep, Store};
+use crate::report::change_counts::ChangeCounts;
 use crate::report::job_report::{Report, ReportParts, SlowestPart};
 use crate::report::selection_report::SelectionReport;
 use crate::run::done::Done;
@@ -30,13 +31,14 @@ use crate::run::folder::{Folder, done_with};
 use crate::run::job::Job;
 use crate::run::part_entries::PartJournals;
 use crate::run::phases::join::JoinedParts;
-use crate::run::phases::level_phase::{hierarchy_of, key_of_tiles, left_out_warning, level_sizes, make_levels};
+use crate::run::phases::level_phase::{hierarchy_of, left_out_warning, level_sizes, make_levels};
 use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::part_store::PartStores;
 use crate::run::phases::read_phase::sum_up;
 use crate::run::phases::select_phase::{SelectedPart, found_ground};
 use crate::run::phases::tile_queue::TileAppearance;
 use crate::run::update::changes::write_changes;
+use crate::run::update::outdated_levels::{forget_outdated_levels, key_of_tiles};
 use crate::run::whole_run::WholeRun;
 use crate::tiles::style::TileStyle;
 use crate::tiles::write_tile::TileStats;
@@ -74,7 +76,8 @@ pub(crate) fn publish_job(
     let tileset = wants_tileset(job.plan, &figures.tiles).then(|| levels_and_root(run, job, stores, joined, &figures));
     let (tiles, hull) = (&TilesOfParts { job, stores }, joined.hull_count(job, stores)?);
     let written = WrittenFiles { stats: figures.tiles, hull, tiles };
-    let published = publish(run, job, bounds, &written, &joined.appearance, tileset.transpose()?)?;
+    let mut published = publish(run, job, bounds, &written, &joined.appearance, tileset.transpose()?)?;
+    published.warnings.extend(grown_parts(job.plan, &figures.points));
     let peak_memory = parts.iter().map(PartProgress::peak_memory).max().flatten().max(joined.peak_memory);
     let costs = CostsOfParts {
         slowest: (parts.len() > 1).then(|| slowest(&parts)).flatten(),
@@ -82,10 +85,26 @@ pub(crate) fn publish_job(
         cpu_s: if figures.by_tasks { processor_seconds(&parts) } else { 0.0 },
     };
     let list = list_of_files(run)?;
-    if job.plan.options.updates {
-        write_changes(run.directory, &job.plan.lattice, tiles, &list)?;
-    }
-    Ok(write_report(run, job, summary.counts, figures, costs, published, &list)?)
+    let update = match job.plan.options.updates {
+        true => write_changes(run.directory, &job.plan.lattice, tiles, &list)?,
+        false => None,
+    };
+    let list = write_pending(&run.directory.output().checksums(), list_text(&list).as_bytes())?;
+    Ok(write_report(run, job, summary.counts, figures, costs, published, (list, update))?)
+}
+
+/// Returns what the user should know if parts have grown since the first run of a job that is updated.
+fn grown_parts(plan: &Plan, points: &[u64]) -> Option<String> {
+    let most = plan.points_per_part().saturating_mul(2);
+    let grown = points.iter().filter(|points| **points > most).count();
+    (plan.cut.is_some() && grown > 0).then(|| {
+        format!(
+            "{} more than twice the {} points that a part is to have, so updates of them take longer; fix: run once with --restart, which cuts \
+             all parts anew",
+            if grown == 1 { "1 part has".into() } else { format!("{grown} parts have") },
+            grouped(plan.points_per_part())
+        )
+    })
 }
 
 /// What the phases of parts took.
@@ -176,6 +195,9 @@ fn levels_and_root(
         let directory = &job.directory.join();
         let key = key_of_tiles(job, &job.parts.all().collect::<Vec<PartIndex>>())?;
         let done = done_with(job, directory, job.above(), JobStep::Levels, key)?;
+        if done.is_none() {
+            forget_outdated_levels(job, directory, job.above(), &hierarchy)?;
+        }
         let folder = Folder::open(job, directory, job.above())?.with_key(key);
         let top_of = |part: PartIndex| {
             let open = stores.open(part)?;
@@ -469,9 +491,8 @@ fn write_report(
     figures: PartFigures,
     costs: CostsOfParts,
     published: Published,
-    list: &[(String, Checksum)],
+    (list, update): (PendingFile, Option<ChangeCounts>),
 ) -> Result<Report> {
-    let list = write_pending(&run.directory.output().checksums(), list_text(list).as_bytes())?;
     let of_all = figures.selected.first().and_then(|part| part.all);
     let selection = match (of_all, job.plan.options.output.max_error) {
         (Some(selected), MaxError::Units(bound)) => Some(SelectionReport::new(job.plan, bound, &selected)),
@@ -499,6 +520,7 @@ fn write_report(
         contours: published.contours,
         exports: published.exports,
         terrain: published.terrain,
+        update,
         warnings: published.warnings,
         other_bytes: published.bytes + list.bytes,
         temporary: figures.temporary,

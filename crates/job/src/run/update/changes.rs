@@ -4,6 +4,7 @@ use crate::durable::atomic_file::{partial_path, publish, write_pending};
 use crate::durable::directory::JobDirectory;
 use crate::publish::side_files::EachTile;
 use crate::records::{StepRecord, Store, TileSummary};
+use crate::report::change_counts::ChangeCounts;
 use lattice::Lattice;
 use rust_decimal::prelude::ToPrimitive;
 use serde::Serialize;
@@ -26,8 +27,8 @@ struct Changes {
     areas: Vec<[f64; 4]>,
 }
 
-/// Writes what has changed since the results that are in place, if there are some. It waits in the job directory. `new` is the list of all
-/// results.
+/// Writes what has changed since the results that are in place, and returns how many have; `None` if there are none. It waits in the job
+/// directory. `new` is the list of all results.
 ///
 /// # Errors
 /// [`Error::Io`] on the lists or the stores of the parts.
@@ -36,8 +37,8 @@ pub(crate) fn write_changes(
     lattice: &Lattice,
     tiles: &dyn EachTile,
     new: &[(String, Checksum)],
-) -> Result<()> {
-    let Some(old) = list_in(&directory.results().checksums())? else { return Ok(()) };
+) -> Result<Option<ChangeCounts>> {
+    let Some(old) = list_in(&directory.results().checksums())? else { return Ok(None) };
     let mut changes = Changes::between(&old, new);
     let other: BTreeSet<&String> = changes.changed.iter().chain(&changes.added).collect();
     let mut areas = Vec::new();
@@ -58,7 +59,10 @@ pub(crate) fn write_changes(
     let path = directory.changes();
     let text = serde_json::to_vec_pretty(&changes).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
     write_pending(&path, &text)?;
-    publish(std::slice::from_ref(&path))
+    publish(std::slice::from_ref(&path))?;
+    let [changed, added, removed] =
+        [&changes.changed, &changes.added, &changes.removed].map(|names| names.len() as u64);
+    Ok(Some(ChangeCounts { changed, added, removed }))
 }
 
 /// Puts the list of changes in its place, if one waits.

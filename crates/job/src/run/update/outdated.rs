@@ -31,8 +31,8 @@ pub(crate) fn forget_from(job: &Job, directory: &JobDirectory, part: PartIndex, 
 /// Tells whether `step` is `changed`, or follows from it in the same folder.
 fn follows(step: JobStep, changed: JobStep) -> bool {
     match changed {
-        JobStep::Mesh => matches!(step, JobStep::Mesh | JobStep::Tiles | JobStep::Levels),
-        JobStep::Join => matches!(step, JobStep::Merge(_) | JobStep::Join | JobStep::Levels),
+        JobStep::Mesh => matches!(step, JobStep::Mesh | JobStep::Tiles | JobStep::LevelTiles | JobStep::Levels),
+        JobStep::Join => matches!(step, JobStep::Merge(_) | JobStep::Join),
         _ => step == changed,
     }
 }

@@ -1,0 +1,119 @@
+//! Coarser tiles of an update: those stay whose finer tiles are as they were.
+
+use crate::Result;
+use crate::durable::atomic_file::remove_file;
+use crate::durable::directory::JobDirectory;
+use crate::durable::journal::PublishedFile;
+use crate::index::{NodeIndex, PartIndex};
+use crate::levels::hierarchy::{ChildTile, Hierarchy};
+use crate::levels::make_level::LevelStats;
+use crate::records::{JobStep, Journal, JournalEntry, StepRecord};
+use crate::run::done::Done;
+use crate::run::job::Job;
+use crate::run::part_entries::entries_of;
+use serde::{Deserialize, Serialize};
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use tiles::checksums::Checksum;
+use xxhash_rust::xxh3::Xxh3;
+
+/// A coarser tile that is made, in a job that is to be updated.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct MadeLevel {
+    pub(crate) node: NodeIndex,
+    /// Tells the tiles below it from others.
+    pub(crate) key: u64,
+    pub(crate) stats: LevelStats,
+}
+
+/// Returns what tells the exact tiles of these parts from others, in a job that is to be updated; else 0.
+///
+/// # Errors
+/// [`sys::Error::Io`] if a journal cannot be read.
+pub(crate) fn key_of_tiles(job: &Job, parts: &[PartIndex]) -> sys::Result<u64> {
+    if !job.plan.options.updates {
+        return Ok(0);
+    }
+    let mut hasher = Xxh3::new();
+    for &part in parts {
+        let entries = entries_of(&job.directory.part(part), job.header(part))?;
+        let mut files: Vec<&PublishedFile> = files_of_tiles(&entries).collect();
+        files.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+        let lines = files.into_iter().map(|file| format!("{} {}\n", file.name.display(), file.checksum));
+        lines.for_each(|line| hasher.update(line.as_bytes()));
+    }
+    Ok(hasher.digest())
+}
+
+fn files_of_tiles(entries: &[JournalEntry]) -> impl Iterator<Item = &PublishedFile> {
+    entries.iter().filter(|entry| entry.step == JobStep::Tiles).flat_map(|entry| &entry.files)
+}
+
+/// Returns the key of each coarser tile of `hierarchy`, which is that of `part`, in a job that is to be updated; none else.
+///
+/// # Errors
+/// [`sys::Error::Io`] if a journal cannot be read.
+pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) -> sys::Result<Vec<u64>> {
+    if !job.plan.options.updates {
+        return Ok(Vec::new());
+    }
+    let entries = entries_of(&job.directory.part(part), job.header(part))?;
+    let checksums: HashMap<&Path, Checksum> =
+        files_of_tiles(&entries).map(|file| (file.name.as_path(), file.checksum)).collect();
+    let mut keys = vec![0u64; hierarchy.tiles.len()];
+    for index in hierarchy.by_height().into_iter().flatten() {
+        let mut hasher = Xxh3::new();
+        for &child in &hierarchy.tiles[index].children {
+            match child {
+                ChildTile::Exact(tile) => {
+                    let name = job.directory.name(&job.directory.output().tile(tile.number()));
+                    let checksum = checksums.get(name.as_path()).map(Checksum::to_string).unwrap_or_default();
+                    hasher.update(format!("{checksum}\n").as_bytes());
+                }
+                ChildTile::Coarse(finer) => hasher.update(&keys[finer].to_le_bytes()),
+                ChildTile::Part(part) => hasher.update(&key_of_tiles(job, &[part])?.to_le_bytes()),
+            }
+        }
+        keys[index] = hasher.digest();
+    }
+    Ok(keys)
+}
+
+/// In a job that is to be updated, takes the coarser tiles whose finer tiles are others now out of the journal of `part`, or of the nodes above the parts, whose folder is
+/// `directory`.
+///
+/// # Errors
+/// [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
+pub(crate) fn forget_outdated_levels(
+    job: &Job,
+    directory: &JobDirectory,
+    part: PartIndex,
+    hierarchy: &Hierarchy,
+) -> Result<()> {
+    if !job.plan.options.updates {
+        return Ok(());
+    }
+    let keys = keys_of_levels(job, part, hierarchy)?;
+    let keys: HashMap<NodeIndex, u64> = hierarchy.tiles.iter().map(|tile| tile.node).zip(keys).collect();
+    let is_whole = |made: &MadeLevel| keys.get(&made.node) == Some(&made.key);
+    let _lock = directory.lock_within()?;
+    let (mut outdated, mut kept) = (HashSet::<PathBuf>::new(), Vec::new());
+    for mut entry in entries_of(directory, job.header(part))? {
+        if entry.step == JobStep::LevelTiles {
+            let mut done = entry.figures::<Done<Vec<MadeLevel>>>()?;
+            let gone: HashSet<NodeIndex> =
+                done.figures.iter().filter(|made| !is_whole(made)).map(|made| made.node).collect();
+            let name = |node: &NodeIndex| directory.name(&directory.output().level(part.node_number(*node)));
+            let names: HashSet<PathBuf> = gone.iter().map(name).collect();
+            done.figures.retain(is_whole);
+            entry.files.retain(|file| !names.contains(&file.name));
+            let is_of_gone = |key: StepRecord| matches!(key, StepRecord::Level(node) if gone.contains(&node));
+            entry.changes.written.retain(|record| !is_of_gone(record.key()));
+            entry = entry.with_figures(&done)?;
+            outdated.extend(names);
+        }
+        kept.push(entry);
+    }
+    drop(Journal::begin(directory, &job.header(part), kept)?);
+    Ok(outdated.iter().try_for_each(|name| remove_file(&directory.file(name)))?)
+}
