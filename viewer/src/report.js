@@ -38,6 +38,12 @@ function vertices({ sites, selection }) {
   return selection ? `${count(sites)} of ${count(selection.points)} points; the others are within ${selection.greatest_error.toPrecision(3)}` : count(sites);
 }
 
+// What the mesh shows, and the option that chose it.
+function surface({ surface: words, input }) {
+  if (!words) return null;
+  return input?.surface ? `${words} (surface = "${input.surface}")` : words;
+}
+
 function rasters(raster) {
   if (!raster) return null;
   const [columns, lines] = raster.size;
@@ -56,7 +62,7 @@ export function describeReport(report) {
   const facts = element('dl', {}, ...rows([
     ['points read', count(report.points.read)],
     ['points left out', leftOut(report)],
-    ['surface', report.surface],
+    ['surface', surface(report)],
     ['vertices', vertices(report)],
     ['triangles', count(report.triangles)],
     ['tiles', count(report.tiles)],
