@@ -16,7 +16,7 @@ export const WATER_COLOR = 'rgb(72 132 204)';
 // Triangles between vertices of water that are steeper (rise over run) are a bank, not water.
 const STEEPEST_WATER = 0.2;
 // Edges are plain where triangles have this many pixels on the screen, the second number, and fade away with the distance down to the first one.
-const EDGE_PIXELS = [4, 16];
+const EDGE_PIXELS = [3, 12];
 
 // The light on level ground is 1 under the default sun, and comes from three places: the sun, the sky, and two faint lights beside the sun. Those
 // two let slopes in shadow keep their form.
