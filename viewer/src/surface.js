@@ -12,7 +12,7 @@ export const STEEPEST_DEGREES = 60;
 export const LEVEL_COLORS = ['#e15759', '#f28e2b', '#edc948', '#59a14f', '#4e79a7', '#b07aa1', '#9c755f', '#ff9da7'];
 export const EXACT_COLOR = '#c9d3dc';
 // As the class water has it.
-export const WATER_COLOR = 'rgb(72 132 204)';
+export const WATER_COLOR = '#4884cc';
 // Triangles between vertices of water that are steeper (rise over run) are a bank, not water.
 const STEEPEST_WATER = 0.2;
 // Edges are plain where triangles have this many pixels on the screen, the second number, and fade away with the distance down to the first one.
