@@ -57,7 +57,8 @@ impl Bands {
         }
         let is_jpeg = compression == COMPRESSION_JPEG;
         let is_ycbcr = photometric == YCBCR;
-        if ![BLACK_IS_ZERO, RGB].contains(&photometric) && !(is_ycbcr && is_jpeg) {
+        let is_known = [BLACK_IS_ZERO, RGB].contains(&photometric) || (is_ycbcr && is_jpeg);
+        if !is_known {
             return Err(format!("its colours are of a kind that is not read ({photometric}): grey, RGB and RGBA are"));
         }
         if planar == PLANAR && count > 1 {

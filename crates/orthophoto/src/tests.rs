@@ -113,7 +113,7 @@ fn the_upper_and_the_left_edge_belong_to_a_picture_and_nothing_beyond() {
 fn where_a_picture_is_clear_or_has_no_data_there_is_no_colour() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("photo.tif");
-    let is_clear = |column: u32, row: u32| (column + row) % 2 == 0;
+    let is_clear = |column: u32, row: u32| (column + row).is_multiple_of(2);
     let rgba = |(column, row)| {
         let [red, green, blue] = color(column, row);
         [red, green, blue, if is_clear(column, row) { 0 } else { 255 }]

@@ -87,7 +87,7 @@ impl TileStyle {
                 VertexColors::OfPoints(Coloring::Elevation(heights))
             }
             ColorChoice::Auto | ColorChoice::Rgb => VertexColors::OfPoints(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
-            ColorChoice::Photo(path) => VertexColors::OfPhoto(PhotoColors::open(plan, path)?),
+            ColorChoice::Photo(path) => VertexColors::OfPhoto(Box::new(PhotoColors::open(plan, path)?)),
         };
         let compression = packing(output, plan.curvature.as_ref());
         let frame = match &plan.curvature {

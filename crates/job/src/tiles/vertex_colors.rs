@@ -24,7 +24,7 @@ pub(crate) enum VertexColors {
     /// From what is known of each point.
     OfPoints(Coloring),
     /// From the pixels of an orthophoto.
-    OfPhoto(PhotoColors),
+    OfPhoto(Box<PhotoColors>),
 }
 
 /// The colours of an orthophoto.
