@@ -389,10 +389,11 @@ class Viewer {
   async savePicture() {
     this.view.update();
     this.renderer.render(this.scene, this.camera);
-    const sky = getComputedStyle(page).getPropertyValue('--sky-colors').trim().split(/\s+/);
+    const style = getComputedStyle(page);
+    const [sky, ink] = ['--sky-colors', '--text'].map((name) => style.getPropertyValue(name).trim());
     const words = byId('attribution').textContent;
     const ratio = this.renderer.getPixelRatio();
-    save(await pictureOf({ canvas, ratio, sky, parts: legendOf(this), bar: this.bar, words }), 'terrain.png');
+    save(await pictureOf({ canvas, ratio, sky: sky.split(/\s+/), parts: legendOf(this), bar: this.bar, words, ink }), 'terrain.png');
   }
 
   // Draws the heights along the ruler anew if its places or the tiles have changed.

@@ -59,8 +59,8 @@ function drawScale(pen, { pixels, text }, right, bottom) {
 }
 
 // Returns a picture as a PNG. `canvas` has just been drawn, with `ratio` pixels for each of the window; `sky` are the colours behind it from the
-// top on; `words` stand in the lower right corner.
-export function pictureOf({ canvas, ratio, sky, parts, bar, words }) {
+// top on; `words` stand in the lower right corner, in the colour `ink`.
+export function pictureOf({ canvas, ratio, sky, parts, bar, words, ink }) {
   const picture = Object.assign(document.createElement('canvas'), { width: canvas.width, height: canvas.height });
   const pen = picture.getContext('2d');
   const background = pen.createLinearGradient(0, 0, 0, canvas.height);
@@ -75,7 +75,7 @@ export function pictureOf({ canvas, ratio, sky, parts, bar, words }) {
   const hasWords = words !== '';
   if (bar) drawScale(pen, bar, width - EDGE, height - EDGE - (hasWords ? LINE + 4 : 0));
   if (hasWords) {
-    Object.assign(pen, { fillStyle: INK, textAlign: 'right' });
+    Object.assign(pen, { fillStyle: ink, textAlign: 'right' });
     pen.fillText(words, width - EDGE, height - EDGE);
   }
   return new Promise((resolve, reject) => {

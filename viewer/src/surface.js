@@ -14,7 +14,7 @@ export const EXACT_COLOR = '#c9d3dc';
 // As the class water has it.
 export const WATER_COLOR = '#4884cc';
 // Triangles between vertices of water that are steeper (rise over run) are a bank, not water.
-const STEEPEST_WATER = 0.2;
+const STEEPEST_WATER = 1;
 // Edges are plain where triangles have this many pixels on the screen, the second number, and fade away with the distance down to the first one.
 const EDGE_PIXELS = [3, 12];
 
@@ -114,11 +114,13 @@ void main() {
     vec3 up = face;
   #endif
   vec3 color = pointColor;
+  vec3 lit = up;
   #ifdef HAS_WATER
     // The normal of a vertex on a shore is the mean of the water's and the bank's. So each triangle there has its own.
     up = normalize(mix(up, face, waterShare));
+    lit = up;
     if (waterShare > 0.999 && length(face.xz) < ${STEEPEST_WATER.toFixed(2)} * face.y) {
-      up = vec3(0.0, 1.0, 0.0);
+      lit = vec3(0.0, 1.0, 0.0);
       if (paintsWater) color = waterColor;
     }
   #endif
@@ -130,7 +132,7 @@ void main() {
   #include <color_fragment>
   if (mode != 4) diffuseColor.rgb = color;
   // The eye sees ratios of light in encoded colours, as in preview.png: hence the power.
-  if (shaded) diffuseColor.rgb *= pow(lightOn(up), 2.2);
+  if (shaded) diffuseColor.rgb *= pow(lightOn(lit), 2.2);
   gl_FragColor = vec4(diffuseColor.rgb, 1.0);
   #include <colorspace_fragment>
 }`;

@@ -1,8 +1,12 @@
-// Which vertices are water: those of class 9, where vertices carry their class, and those on the shores of lakes, which breaklines.csv lists. A
-// lake has no points inside, so that a triangle is water if all its corners are.
-import { BufferAttribute, Vector3 } from 'three';
+// Which vertices are water: those of class 9, where vertices carry their class or its colour, and those on the shores of lakes, which
+// breaklines.csv lists. A lake has no points inside, so that a triangle is water if all its corners are.
+import { BufferAttribute, Color, Vector3 } from 'three';
+import { WATER_COLOR } from './surface.js';
 
 const WATER = 9;
+const { r: RED, g: GREEN, b: BLUE } = new Color(WATER_COLOR);
+// Tiles may hold colours in eight linear bits.
+const NEAR = 1.5 / 255;
 // Lists of more lines take long to load; lakes then look like land.
 const MOST_BYTES = 32e6;
 
@@ -41,14 +45,15 @@ export class Water {
   }
 
   // Returns for each vertex 1 if it is water, else 0; null if none is.
-  attribute({ attributes: { position, _classification: classes } }, toScene, georeference) {
+  attribute({ attributes: { position, color, _classification: classes } }, toScene, georeference) {
     this.places ??= placesOf(this.list, georeference);
-    if (!classes && this.places.size === 0) return null;
+    if (!classes && !color && this.places.size === 0) return null;
+    const isShown = (i) => Math.abs(color.getX(i) - RED) < NEAR && Math.abs(color.getY(i) - GREEN) < NEAR && Math.abs(color.getZ(i) - BLUE) < NEAR;
     const isWater = new Uint8Array(position.count);
     const vertex = new Vector3();
     for (let i = 0; i < position.count; i += 1) {
-      if (classes?.getX(i) === WATER) isWater[i] = 255;
-      else if (this.isOnShore(georeference.step(vertex.fromBufferAttribute(position, i).applyMatrix4(toScene).toArray()))) isWater[i] = 255;
+      if (classes?.getX(i) === WATER || (color && isShown(i))) isWater[i] = 255;
+      else if (this.places.size && this.isOnShore(georeference.step(vertex.fromBufferAttribute(position, i).applyMatrix4(toScene).toArray()))) isWater[i] = 255;
     }
     return isWater.some(Boolean) ? new BufferAttribute(isWater, 1, true) : null;
   }
