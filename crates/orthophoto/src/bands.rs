@@ -6,6 +6,8 @@ use tiff::tags::Tag;
 
 const COMPRESSION_NONE: u16 = 1;
 const COMPRESSION_JPEG: u16 = 7;
+/// None, LZW, JPEG, DEFLATE by both of its numbers, and PackBits.
+const COMPRESSIONS: [u16; 6] = [COMPRESSION_NONE, 5, COMPRESSION_JPEG, 8, 32946, 32773];
 const BLACK_IS_ZERO: u16 = 1;
 const RGB: u16 = 2;
 const PALETTE: u16 = 3;
@@ -54,6 +56,12 @@ impl Bands {
                 "it has a palette: make a picture in colours of it, for example with `gdal_translate -expand rgb`"
                     .into(),
             );
+        }
+        if !COMPRESSIONS.contains(&compression) {
+            return Err(format!(
+                "it is compressed in a way that is not read ({compression}): use another one, for example with `gdal_translate -co \
+                 COMPRESS=DEFLATE`"
+            ));
         }
         let is_jpeg = compression == COMPRESSION_JPEG;
         let is_ycbcr = photometric == YCBCR;

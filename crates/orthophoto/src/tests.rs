@@ -218,6 +218,13 @@ fn what_cannot_be_read_is_refused_with_a_way_out() {
     write::<RGB8>(&path, Compression::Uncompressed, &PLACE, &rgb());
     assert!(refusal(&path, &none, 10).contains("-of COG"));
     let whole = std::fs::read(&path).unwrap();
+    // Tag 259 is the compression, and 34925 is LZMA.
+    let entry = [&259_u16.to_le_bytes()[..], &3_u16.to_le_bytes(), &1_u32.to_le_bytes(), &1_u16.to_le_bytes()].concat();
+    let at = whole.windows(entry.len()).position(|bytes| bytes == entry).unwrap();
+    let mut other = whole.clone();
+    other[at + 8..at + 10].copy_from_slice(&34925_u16.to_le_bytes());
+    std::fs::write(&path, other).unwrap();
+    assert!(refusal(&path, &none, LARGE).contains("COMPRESS=DEFLATE"));
     let missing = Orthophoto::open(&folder.path().join("none.tif"), &none, LARGE).unwrap_err();
     assert!(matches!(&missing, Error::Config(what) if what.contains("none.tif")), "{missing}");
     // A file that is cut off anywhere is refused, or its colours are, and nothing panics.
