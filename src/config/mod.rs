@@ -125,6 +125,12 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
         let Anchored { base, path } = anchor("[output] height_offset", &name, base)?;
         *grid = base.join(path);
     }
+    if let Some(photo) = options.output.color.photo_mut() {
+        let name = photo.to_string_lossy().into_owned();
+        refuse_url("[output] color", &name)?;
+        let Anchored { base, path } = anchor("[output] color", &name, base)?;
+        *photo = base.join(path);
+    }
     if let Some(clip) = options.input.clip.as_mut() {
         refuse_url("[input] clip", clip)?;
         let Anchored { base, path } = anchor("[input] clip", clip, base)?;

@@ -69,6 +69,7 @@ mod mistakes;
 mod names;
 mod nodata;
 mod one_command;
+mod orthophoto;
 mod overlap;
 mod parts;
 mod preflight;

@@ -81,6 +81,54 @@ fn a_double_click_is_one_place_of_the_ruler_and_heights_have_their_own_unit() {
     assert!(flat.ends_with(" ft)") && !up.contains('(') && !direct.contains('(') && slope.ends_with('°'), "{cells:?}");
 }
 
+/// Returns the numbers of a row of CSV; an empty value is none.
+fn numbers(row: &str) -> Vec<Option<f64>> {
+    row.split(',').map(|value| value.parse().ok()).collect()
+}
+
+#[test]
+fn the_ruler_shows_the_heights_along_it_and_files_can_be_saved() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("", "format = \"glb\"");
+    let catch = "window.saved = []; const make = URL.createObjectURL; \
+                 URL.createObjectURL = (blob) => { window.saved.push(blob); return make.call(URL, blob); }; \
+                 document.getElementById('tab-point').click(); document.getElementById('ruler').click()";
+    let picture = "window.saved[1].arrayBuffer().then((bytes) => btoa(String.fromCharCode(...new Uint8Array(bytes).slice(0, 24))))";
+    let steps = json!([
+        {"size": [1280, 800], "dark": false},
+        {"wait": SHOWN},
+        {"run": catch},
+        {"click": [300, 400]},
+        {"click": [650, 420]},
+        {"wait": format!("{FOUND} && {SHOWN} && !document.getElementById('profile').hidden")},
+        {"run": "document.getElementById('profile-save').click()"},
+        {"run": "document.getElementById('picture').click()"},
+        {"wait": "window.saved.length === 2"},
+        {"run": "window.saved[0].text()"},
+        {"run": picture},
+        {"run": "[...document.querySelectorAll('#ruler-rows td')].map((cell) => cell.textContent)"},
+        {"run": "document.getElementById('scale').textContent"},
+    ]);
+    let seen = terrain.seen(&chromium, &steps);
+    let [csv, picture, cells, scale] = &seen["values"].as_array().unwrap()[3..] else { panic!("{seen}") };
+    let mut lines = csv.as_str().unwrap().lines();
+    assert_eq!(lines.next(), Some("distance,x,y,z"));
+    let rows: Vec<Vec<Option<f64>>> = lines.map(numbers).collect();
+    // The grid has a point every three metres: the line crosses many edges, and leaves no gap.
+    assert!(rows.len() > 60, "{csv}");
+    assert!(
+        rows.windows(2).all(|two| two[0][0] <= two[1][0] && two[1][3].is_some_and(|z| (99.9..100.4).contains(&z))),
+        "{csv}"
+    );
+    let [first, last] = [&rows[0], &rows[rows.len() - 1]].map(|row| [row[0], row[1], row[2]].map(Option::unwrap));
+    let reach = (last[1] - first[1]).hypot(last[2] - first[2]);
+    let told: f64 = cells[0].as_str().unwrap().trim_end_matches(" m").parse().unwrap();
+    assert!((last[0] - reach).abs() < 0.05 && (told - reach).abs() < 0.05, "{last:?} {reach} {told}");
+    // A PNG of the canvas: 950 x 800 pixels.
+    assert!(picture.as_str().unwrap().starts_with("iVBORw0KGgoAAAANSUhEUg"), "{picture}");
+    assert!(scale.as_str().unwrap().ends_with(" m"), "{scale}");
+}
+
 #[test]
 fn a_tileset_of_another_program_is_told_apart() {
     let Some(chromium) = chromium() else { return };

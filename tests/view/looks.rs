@@ -138,6 +138,38 @@ fn images_of_a_map_service_cover_the_terrain_once_the_user_names_it() {
 }
 
 #[test]
+fn a_lake_is_blue_where_colours_stand_for_heights() {
+    let Some(chromium) = chromium() else { return };
+    let terrain = Terrain::new("", "format = \"3dtiles\"\ncolor = \"elevation\"");
+    let shot = |name: &str| terrain.folder.path().join(name);
+    let look = |name: &str| {
+        let steps = json!([{"size": [1280, 800], "dark": false}, {"wait": SHOWN}, {"shot": shot(name)}, {"run": "document.getElementById('legend').textContent"}]);
+        terrain.seen(&chromium, &steps)["values"][0].as_str().unwrap().to_owned()
+    };
+    let legend = look("land.png");
+    assert!(legend.contains("Height") && !legend.contains("water"), "{legend}");
+    let shore =
+        [[500_040, 4_800_040], [500_170, 4_800_040], [500_170, 4_800_170], [500_040, 4_800_170], [500_040, 4_800_040]];
+    let shore = shore.map(|[x, y]| json!([x, y, 99.5]));
+    let lake = json!({"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [shore]}});
+    std::fs::write(shot("lake.geojson"), lake.to_string()).unwrap();
+    let config = std::fs::read_to_string(shot("job.toml")).unwrap();
+    let lines = "[[breaklines]]\nfiles = [\"lake.geojson\"]\nkind = \"lake\"\ncrs = \"points\"\n";
+    std::fs::write(shot("job.toml"), format!("{config}{lines}")).unwrap();
+    terrain.succeeds(&["job.toml", "--quiet"]);
+    let legend = look("lake.png");
+    assert!(legend.contains("water"), "{legend}");
+    // Level water has the light of level ground, which changes no colour.
+    let is_blue =
+        |pixel: &[u8; 3]| [72, 132, 204].into_iter().zip(pixel).all(|(wanted, value)| value.abs_diff(wanted) < 12);
+    let [land, lake] = ["land.png", "lake.png"].map(|name| {
+        let pixels = pixels(&shot(name));
+        pixels.iter().filter(|pixel| is_blue(pixel)).count() as f64 / pixels.len() as f64
+    });
+    assert!(land < 0.001 && lake > 0.1, "{land} and {lake} of the picture are blue");
+}
+
+#[test]
 fn every_way_to_look_draws_something_else() {
     let Some(chromium) = chromium() else { return };
     let terrain = Terrain::new("", "format = \"3dtiles\"");

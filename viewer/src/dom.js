@@ -9,6 +9,13 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
+// Lets the browser save a file.
+export function save(blob, name) {
+  const url = URL.createObjectURL(blob);
+  element('a', { href: url, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(url), 60_000);
+}
+
 // Returns rows of a list of terms: [term, value] each, those without a value left out.
 export function rows(pairs) {
   const present = pairs.filter(([, value]) => value !== null && value !== undefined && value !== '');

@@ -1,6 +1,7 @@
 // Dresses the meshes of loaded tiles: gives them their material, shows their edges, and finds the range of their heights.
 import { BufferAttribute, Mesh, Vector3 } from 'three';
 import { matrixToScene } from './surface.js';
+import { Water } from './water.js';
 
 const SAMPLES_PER_MESH = 2000;
 // Slopes are drawn so much steeper, or flatter, that this share of the terrain has less than this slope (rise over run): hills and valleys are
@@ -16,6 +17,22 @@ function liftOf({ attributes: { position } }, toScene, georeference) {
     lifts[i] = georeference.lift(vertex.fromBufferAttribute(position, i).applyMatrix4(toScene).toArray());
   }
   return new BufferAttribute(lifts, 1);
+}
+
+// Returns about how far the vertices of a mesh are apart in the plane, in metres, from some of its triangles. Trees and walls must not count.
+function spacingOf({ geometry: { index, attributes: { position } }, userData: { toScene } }) {
+  const count = Math.floor((index ?? position).count / 3);
+  const step = Math.max(1, Math.floor(count / SAMPLES_PER_MESH));
+  const corners = [new Vector3(), new Vector3(), new Vector3()];
+  const areas = [];
+  for (let i = 0; i < count; i += step) {
+    corners.forEach((corner, k) => {
+      corner.fromBufferAttribute(position, index ? index.getX(3 * i + k) : 3 * i + k).applyMatrix4(toScene);
+    });
+    const [a, b, c] = corners;
+    areas.push(Math.abs((b.x - a.x) * (c.z - a.z) - (b.z - a.z) * (c.x - a.x)));
+  }
+  return Math.sqrt(quantile(areas, 0.5));
 }
 
 function meshesOf(scene) {
@@ -35,6 +52,8 @@ export class Dressing {
     this.surface = surface;
     this.meshes = new Set();
     this.showsEdges = false;
+    this.hasWater = false;
+    this.water = new Water();
   }
 
   // Gives all meshes of a glTF scene their material. `facts` says what a click on one of them tells of its tile, and `georeference` whether the
@@ -43,6 +62,9 @@ export class Dressing {
     for (const mesh of meshesOf(scene)) {
       const toScene = matrixToScene(mesh, scene);
       if (georeference.curvature) mesh.geometry.setAttribute('lift', liftOf(mesh.geometry, toScene, georeference));
+      const water = this.water.attribute(mesh.geometry, toScene, georeference);
+      if (water) mesh.geometry.setAttribute('water', water);
+      this.hasWater ||= Boolean(water);
       const plain = mesh.material;
       mesh.material = this.surface.material(mesh, toScene, levelColor);
       plain.dispose();
@@ -58,6 +80,11 @@ export class Dressing {
     }
   }
 
+  // Returns the meshes of some scenes that can be shown.
+  meshesOf(scenes) {
+    return scenes.flatMap(meshesOf).filter((mesh) => this.meshes.has(mesh));
+  }
+
   remove(scene) {
     scene.traverse((object) => this.meshes.delete(object));
   }
@@ -70,7 +97,7 @@ export class Dressing {
   dressEdges(mesh) {
     const { edges } = mesh.userData;
     if (this.showsEdges && !edges) {
-      const lines = new Mesh(mesh.geometry, this.surface.edges);
+      const lines = new Mesh(mesh.geometry, this.surface.edges(spacingOf(mesh)));
       lines.raycast = () => {};
       lines.frustumCulled = mesh.frustumCulled;
       mesh.userData.edges = lines;

@@ -104,6 +104,11 @@ export class Georeference {
     return this.flat(position).map((metres, axis) => this.offset[axis] + metres / this.metres[axis]);
   }
 
+  // Returns the steps of the lattice that a vertex at a scene position lies at.
+  step(position) {
+    return this.lattice(this.flat(position)).map(Math.round);
+  }
+
   // Returns the scene position in metres of source coordinates.
   scene(source) {
     const flat = source.map((value, axis) => (value - this.offset[axis]) * this.metres[axis]);

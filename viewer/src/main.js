@@ -4,20 +4,24 @@ import { absoluteTemplate, isTemplate, mayAsk } from './hosts.js';
 import { CanvasTexture, PerspectiveCamera, Scene, Sprite, SpriteMaterial, Vector3, WebGLRenderer } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
-import { byId, count } from './dom.js';
+import { byId, count, save } from './dom.js';
 import { Dressing } from './dressing.js';
 import { ExaggeratedView, LEAST, MOST, usualExaggeration } from './exaggeration.js';
-import { showLegend } from './legend.js';
+import { legendOf, showLegend } from './legend.js';
 import { Link, readNumbers, writeNumbers } from './link.js';
 import { OneFileTerrain } from './one_file_terrain.js';
 import { Orbit } from './orbit.js';
 import { Panel } from './panel.js';
 import { Picker } from './picking.js';
+import { pictureOf } from './picture.js';
 import { describeColors } from './point_colors.js';
+import { ProfileChart, profileAlong } from './profile.js';
 import { Ruler } from './ruler.js';
+import { scaleBar, showScale } from './scale.js';
 import { MODES, Surface, sunDirection } from './surface.js';
 import { TilesetTerrain } from './tileset_terrain.js';
 import { Walk } from './walk.js';
+import { Water } from './water.js';
 
 const canvas = byId('terrain');
 const page = document.documentElement;
@@ -105,7 +109,8 @@ class Viewer {
     this.scene.add(this.mark);
   }
 
-  async open(file) {
+  // Opens a terrain, whose report is there or null.
+  async open(file, report) {
     const loader = new GLTFLoader().setMeshoptDecoder(MeshoptDecoder);
     const { dressing, camera, renderer, changed } = this;
     const progress = (loaded, total) => say('loading', `Loading ${file}: ${(loaded / 1e6).toFixed(0)}${total ? ` of ${(total / 1e6).toFixed(0)}` : ''} MB`);
@@ -113,12 +118,14 @@ class Viewer {
     const imagesFailed = (error) => this.imagesFailed(error);
     const terrain = new Terrain(new URL(file, document.baseURI).href, { loader, dressing, camera, renderer, changed, progress, imagesFailed });
     this.fit();
+    dressing.water = await Water.load(report);
     await terrain.open();
     this.terrain = terrain;
     this.scene.add(terrain.object);
     this.detail = DETAIL_PIXELS[USUAL_DETAIL];
     this.picker = new Picker(terrain, camera, () => this.nextFrame());
     this.ruler = new Ruler(this.scene, terrain, changed);
+    this.profile = new ProfileChart(terrain.georeference, save);
     this.showAll();
   }
 
@@ -146,6 +153,7 @@ class Viewer {
     const { clientWidth: width, clientHeight: height } = canvas;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
+    this.surface.focalPixels.value = height / (2 * Math.tan((this.plain.fov * Math.PI) / 360));
     this.plain.aspect = width / Math.max(height, 1);
     this.plain.updateProjectionMatrix();
     if (this.terrain && this.isWhole) this.showAll();
@@ -358,8 +366,47 @@ class Viewer {
     this.changed();
   }
 
+  // Whether colours are not those that points were recorded with, so that water is painted.
+  get showsHeights() {
+    const { ramp, isPlain } = this.pointColors;
+    return this.mode === 'points' && Boolean(ramp ?? isPlain) && !this.terrain.difference;
+  }
+
   legend() {
-    if (this.heights) showLegend(this);
+    if (!this.heights) return;
+    this.surface.shared.paintsWater.value = this.showsHeights;
+    showLegend(this);
+  }
+
+  // Returns the scale bar, or null on a walk, where each place has another scale.
+  get bar() {
+    if (this.walk.isOn) return null;
+    const distance = this.plain.position.distanceTo(this.orbit.target);
+    return scaleBar(this.plain, canvas.clientHeight, distance, this.terrain.georeference.metres[0]);
+  }
+
+  // Lets the user save the view as a picture.
+  async savePicture() {
+    this.view.update();
+    this.renderer.render(this.scene, this.camera);
+    const style = getComputedStyle(page);
+    const [sky, ink] = ['--sky-colors', '--text'].map((name) => style.getPropertyValue(name).trim());
+    const words = byId('attribution').textContent;
+    const ratio = this.renderer.getPixelRatio();
+    save(await pictureOf({ canvas, ratio, sky: sky.split(/\s+/), parts: legendOf(this), bar: this.bar, words, ink }), 'terrain.png');
+  }
+
+  // Draws the heights along the ruler anew if its places or the tiles have changed.
+  showProfile() {
+    const { terrain, ruler } = this;
+    if (terrain.isLoading) return;
+    const { key, scenes } = terrain.shownScenes;
+    const shown = `${ruler.version} ${ruler.places.length > 1 ? key : ''}`;
+    if (shown === this.shownProfile) return;
+    this.shownProfile = shown;
+    const line = ruler.places.map(({ source }) => source);
+    const rows = line.length > 1 ? profileAlong(line, this.dressing.meshesOf(scenes), terrain.georeference) : [];
+    this.profile.show(rows, ruler.bends);
   }
 
   tell() {
@@ -368,9 +415,12 @@ class Viewer {
     const ahead = this.plain.getWorldDirection(new Vector3());
     byId('compass').firstElementChild.style.transform = `rotate(${-Math.atan2(ahead.x, -ahead.z)}rad)`;
     byId('shown').textContent = `${count(triangles)} triangles are drawn${this.coarser > 1 ? ', and no finer ones, to stay fast' : ''}`;
+    showScale(this.heights ? this.bar : null);
+    this.showProfile();
     const images = this.mode === 'images' && this.template ? [`Images: ${new URL(this.template).host}`] : [];
     byId('attribution').textContent = [...terrain.attributions, ...images].join(' · ');
-    if (this.mode === 'levels') this.legend();
+    if (this.mode === 'levels' || this.dressing.hasWater !== this.toldWater) this.legend();
+    this.toldWater = this.dressing.hasWater;
     const isEmpty = this.dressing.meshes.size === 0;
     if (isEmpty && terrain.failures.length && !terrain.isLoading) say('failed', 'The tiles cannot be loaded. Is the folder complete?');
     else if (terrain.isLoading || !this.heights) say('loading', 'Loading tiles…');
@@ -486,7 +536,8 @@ try {
   const viewer = new Viewer();
   const panel = new Panel(viewer, DETAIL_PIXELS, USUAL_DETAIL);
   viewer.panel = panel;
-  const [report] = await Promise.all([reportOf(), terrainFile().then((file) => viewer.open(file))]);
+  const [report, file] = await Promise.all([reportOf(), terrainFile()]);
+  await viewer.open(file, report);
   listen(viewer, panel);
   panel.enable();
   panel.showReport(report);

@@ -29,6 +29,10 @@ export class OneFileTerrain {
     this.object.updateMatrixWorld(true);
   }
 
+  get shownScenes() {
+    return { key: '', scenes: [this.object] };
+  }
+
   get shownLevels() {
     return { coarser: [], hasExact: true };
   }

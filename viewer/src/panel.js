@@ -79,6 +79,7 @@ export class Panel {
     byId('images-off').addEventListener('click', () => this.showImages(''));
     for (const input of document.getElementsByName('move')) input.addEventListener('change', () => this.move(input.value));
     byId('whole').addEventListener('click', () => this.showWhole());
+    byId('picture').addEventListener('click', () => this.savePicture());
   }
 
   showImages(template) {
@@ -125,6 +126,15 @@ export class Panel {
   showWhole() {
     this.move('orbit');
     this.viewer.showAll();
+  }
+
+  async savePicture() {
+    try {
+      await this.viewer.savePicture();
+      byId('picture-hint').textContent = '';
+    } catch (error) {
+      byId('picture-hint').textContent = `The picture cannot be saved: ${error.message}`;
+    }
   }
 
   setUpPoint() {

@@ -52,11 +52,12 @@ function classesOf(samples) {
   return CLASSES.filter((entry) => seen.has(entry)).map(([name, ...color]) => ({ name, color }));
 }
 
-// Returns what the colours of samples, see `Dressing.samples`, stand for: `ramp` are the heights at its ends, `classes` have name and colour.
+// Returns what the colours of samples, see `Dressing.samples`, stand for: `ramp` are the heights at its ends, `classes` have name and colour, and
+// `isPlain` says that there are no colours.
 export function describeColors(samples) {
   const color = new Color();
   const bytes = ([r, g, b]) => color.setRGB(r, g, b).convertLinearToSRGB().toArray().map((value) => 255 * value);
   const colored = samples.filter((sample) => sample.color).map((sample) => ({ height: sample.height, color: bytes(sample.color) }));
-  if (colored.length === 0) return {};
+  if (colored.length === 0) return { isPlain: true };
   return { ramp: rampOf(colored), classes: classesOf(colored) };
 }

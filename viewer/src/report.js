@@ -38,6 +38,21 @@ function vertices({ sites, selection }) {
   return selection ? `${count(sites)} of ${count(selection.points)} points; the others are within ${selection.greatest_error.toPrecision(3)}` : count(sites);
 }
 
+const SURFACES = {
+  all: 'all points, with any trees and buildings',
+  ground: 'points of the ground and of water',
+  'bare-earth': 'the ground, found by the program',
+  first: 'first returns, with roofs and tree tops',
+  last: 'last returns',
+};
+
+// Which points the surface is of, and the option that chose them.
+function surface({ input }) {
+  if (!input) return null;
+  const { surface: name, classes } = input;
+  return Array.isArray(classes) ? `points of the classes ${classes.join(', ')}` : `${SURFACES[name] ?? name} (surface = "${name}")`;
+}
+
 function rasters(raster) {
   if (!raster) return null;
   const [columns, lines] = raster.size;
@@ -56,7 +71,8 @@ export function describeReport(report) {
   const facts = element('dl', {}, ...rows([
     ['points read', count(report.points.read)],
     ['points left out', leftOut(report)],
-    ['surface', report.surface],
+    ['surface', surface(report)],
+    ['classes', report.surface],
     ['vertices', vertices(report)],
     ['triangles', count(report.triangles)],
     ['tiles', count(report.tiles)],

@@ -10,7 +10,7 @@ function lengthText(metres, unit) {
 
 export class Ruler {
   constructor(scene, terrain, changed) {
-    Object.assign(this, { terrain, changed, isOn: false, places: [] });
+    Object.assign(this, { terrain, changed, isOn: false, places: [], version: 0 });
     this.line = new Line(new BufferGeometry(), new LineBasicMaterial({ color: '#ff2d95', depthTest: false, transparent: true }));
     this.line.frustumCulled = false;
     this.line.renderOrder = 2;
@@ -61,7 +61,19 @@ export class Ruler {
     this.line.geometry.dispose();
     this.line.geometry = new BufferGeometry().setAttribute('position', new Float32BufferAttribute(corners, 3));
     this.write();
+    this.version += 1;
     this.changed();
+  }
+
+  // The distances along the plane at which the line bends, in units of the source.
+  get bends() {
+    let distance = 0;
+    const at = this.places.slice(1).map(({ source: [x, y] }, i) => {
+      const [fromX, fromY] = this.places[i].source;
+      distance += Math.hypot(x - fromX, y - fromY);
+      return distance;
+    });
+    return at.slice(0, -1);
   }
 
   write() {

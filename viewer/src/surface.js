@@ -11,6 +11,12 @@ export const STEEPEST_DEGREES = 60;
 // From the coarsest level on. The exact tiles have a colour of their own.
 export const LEVEL_COLORS = ['#e15759', '#f28e2b', '#edc948', '#59a14f', '#4e79a7', '#b07aa1', '#9c755f', '#ff9da7'];
 export const EXACT_COLOR = '#c9d3dc';
+// As the class water has it.
+export const WATER_COLOR = '#4884cc';
+// Triangles between vertices of water that are steeper (rise over run) are a bank, not water.
+const STEEPEST_WATER = 1;
+// Edges are plain where triangles have this many pixels on the screen, the second number, and fade away with the distance down to the first one.
+const EDGE_PIXELS = [3, 12];
 
 // The light on level ground is 1 under the default sun, and comes from three places: the sun, the sky, and two faint lights beside the sun. Those
 // two let slopes in shadow keep their form.
@@ -34,6 +40,10 @@ varying vec3 place;
 varying vec3 upright;
 varying vec3 pointColor;
 uniform vec3 plainColor;
+#ifdef HAS_WATER
+  attribute float water;
+  varying float waterShare;
+#endif
 #ifdef HAS_COLORS
   attribute vec3 color;
 #endif
@@ -46,6 +56,9 @@ void main() {
     height -= lift;
   #endif
   place = mat3(toScene) * position;
+  #ifdef HAS_WATER
+    waterShare = water;
+  #endif
   #ifdef HAS_NORMALS
     upright = toSceneNormal * normal;
   #endif
@@ -66,6 +79,11 @@ uniform vec2 heightRange;
 uniform vec3 heightColors[6];
 uniform vec3 slopeColors[6];
 uniform vec3 levelColor;
+uniform vec3 waterColor;
+uniform bool paintsWater;
+#ifdef HAS_WATER
+  varying float waterShare;
+#endif
 varying float height;
 varying vec3 place;
 varying vec3 upright;
@@ -87,13 +105,25 @@ float lightOn(vec3 up) {
   return ${DIRECT.toFixed(2)} * direct + ${SKY.toFixed(2)} * sky + ${(BESIDE / Math.SQRT2).toFixed(3)} * beside;
 }
 void main() {
+  vec3 face = normalize(cross(dFdx(place), dFdy(place)));
+  if (face.y < 0.0) face = -face;
   #ifdef HAS_NORMALS
     vec3 up = normalize(upright);
+    if (up.y < 0.0) up = -up;
   #else
-    vec3 up = normalize(cross(dFdx(place), dFdy(place)));
+    vec3 up = face;
   #endif
-  if (up.y < 0.0) up = -up;
   vec3 color = pointColor;
+  vec3 lit = up;
+  #ifdef HAS_WATER
+    // The normal of a vertex on a shore is the mean of the water's and the bank's. So each triangle there has its own.
+    up = normalize(mix(up, face, waterShare));
+    lit = up;
+    if (waterShare > 0.999 && length(face.xz) < ${STEEPEST_WATER.toFixed(2)} * face.y) {
+      lit = vec3(0.0, 1.0, 0.0);
+      if (paintsWater) color = waterColor;
+    }
+  #endif
   if (mode == 1) color = ramp(heightColors, (height - heightRange.x) / max(heightRange.y - heightRange.x, 1e-6));
   if (mode == 2) color = ramp(slopeColors, degrees(acos(clamp(up.y, 0.0, 1.0))) / ${STEEPEST_DEGREES.toFixed(1)});
   if (mode == 3) color = levelColor;
@@ -102,14 +132,29 @@ void main() {
   #include <color_fragment>
   if (mode != 4) diffuseColor.rgb = color;
   // The eye sees ratios of light in encoded colours, as in preview.png: hence the power.
-  if (shaded) diffuseColor.rgb *= pow(lightOn(up), 2.2);
+  if (shaded) diffuseColor.rgb *= pow(lightOn(lit), 2.2);
   gl_FragColor = vec4(diffuseColor.rgb, 1.0);
   #include <colorspace_fragment>
 }`;
 
+const EDGE_VERTEX = `
+uniform float focalPixels;
+uniform float spacing;
+varying float pixels;
+void main() {
+  vec4 place = modelViewMatrix * vec4(position, 1.0);
+  pixels = focalPixels * spacing / max(-place.z, 1e-6);
+  gl_Position = projectionMatrix * place;
+}`;
+
 const EDGE_FRAGMENT = `
 uniform vec4 edgeColor;
-void main() { gl_FragColor = edgeColor; }`;
+varying float pixels;
+void main() {
+  float shown = smoothstep(${EDGE_PIXELS.map((value) => value.toFixed(1)).join(', ')}, pixels);
+  if (shown < 0.01) discard;
+  gl_FragColor = vec4(edgeColor.rgb, edgeColor.a * shown);
+}`;
 
 export class Surface {
   constructor() {
@@ -122,10 +167,19 @@ export class Surface {
       heightRange: { value: [0, 1] },
       heightColors: { value: linear(HEIGHT_COLORS) },
       slopeColors: { value: linear(SLOPE_COLORS) },
+      waterColor: { value: new Color(WATER_COLOR) },
+      // Colours that were recorded show water as it is.
+      paintsWater: { value: false },
     };
-    this.edges = new ShaderMaterial({
-      uniforms: { edgeColor: { value: [0.02, 0.03, 0.05, 0.45] } },
-      vertexShader: 'void main() { gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }',
+    // Pixels of a length that is as far away as it is long.
+    this.focalPixels = { value: 1 };
+  }
+
+  // Returns the material of the edges of a mesh whose vertices are about `spacing` metres apart.
+  edges(spacing) {
+    return new ShaderMaterial({
+      uniforms: { edgeColor: { value: [0.02, 0.03, 0.05, 0.45] }, focalPixels: this.focalPixels, spacing: { value: spacing } },
+      vertexShader: EDGE_VERTEX,
       fragmentShader: EDGE_FRAGMENT,
       wireframe: true,
       transparent: true,
@@ -135,7 +189,7 @@ export class Surface {
 
   // Returns the material of a mesh. `toScene` leads from its own frame to that of its glTF scene.
   material(mesh, toScene, levelColor) {
-    const { normal, color, lift } = mesh.geometry.attributes;
+    const { normal, color, lift, water } = mesh.geometry.attributes;
     return new ShaderMaterial({
       uniforms: {
         ...this.shared,
@@ -144,7 +198,7 @@ export class Surface {
         plainColor: { value: mesh.material.color.clone() },
         levelColor: { value: new Color(levelColor) },
       },
-      defines: { ...(normal && { HAS_NORMALS: '' }), ...(color && { HAS_COLORS: '' }), ...(lift && { IS_BENT: '' }) },
+      defines: { ...(normal && { HAS_NORMALS: '' }), ...(color && { HAS_COLORS: '' }), ...(lift && { IS_BENT: '' }), ...(water && { HAS_WATER: '' }) },
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       side: DoubleSide,

@@ -123,6 +123,12 @@ export class TilesetTerrain {
     return { coarser: [...new Set(coarser)].sort((a, b) => a - b), hasExact: shown.some((tile) => tile.children.length === 0) };
   }
 
+  // The scenes of the tiles that are shown, and what tells them apart from others.
+  get shownScenes() {
+    const tiles = [...this.tiles.activeTiles].filter((tile) => tile.engineData.scene);
+    return { key: tiles.map(nameOf).join(), scenes: tiles.map((tile) => tile.engineData.scene) };
+  }
+
   set detail(pixels) {
     this.tiles.errorTarget = pixels;
   }

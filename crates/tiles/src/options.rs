@@ -10,7 +10,7 @@ use crs::geoid::option::HeightOffset;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// `[output]`: where the results go, and what they are.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -239,8 +239,8 @@ impl From<ExportChoice> for Vec<String> {
 }
 
 /// Where vertex colours come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub enum ColorChoice {
     /// The points' own colours, or elevation if they have none.
     #[default]
@@ -253,13 +253,71 @@ pub enum ColorChoice {
     Class,
     /// No colours.
     None,
+    /// The pixels of an orthophoto, a GeoTIFF.
+    Photo(PathBuf),
 }
 
 impl ColorChoice {
     /// Returns whether these may be the points' own colours.
-    pub fn may_be_own(self) -> bool {
+    pub fn may_be_own(&self) -> bool {
         matches!(self, ColorChoice::Auto | ColorChoice::Rgb)
     }
+
+    /// Returns the orthophoto, if colours come from one.
+    pub fn photo(&self) -> Option<&Path> {
+        match self {
+            ColorChoice::Photo(path) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// Returns the orthophoto, to be named otherwise.
+    pub fn photo_mut(&mut self) -> Option<&mut PathBuf> {
+        match self {
+            ColorChoice::Photo(path) => Some(path),
+            _ => None,
+        }
+    }
+}
+
+impl TryFrom<String> for ColorChoice {
+    type Error = String;
+
+    fn try_from(text: String) -> std::result::Result<ColorChoice, String> {
+        Ok(match text.as_str() {
+            "auto" => ColorChoice::Auto,
+            "rgb" => ColorChoice::Rgb,
+            "elevation" => ColorChoice::Elevation,
+            "class" => ColorChoice::Class,
+            "none" => ColorChoice::None,
+            name if is_name_of_tiff(name) => ColorChoice::Photo(PathBuf::from(text)),
+            _ => {
+                return Err(format!(
+                    "color is \"auto\", \"rgb\", \"elevation\", \"class\", \"none\" or an orthophoto such as \"ortho.tif\", and {text:?} is \
+                     none of them"
+                ));
+            }
+        })
+    }
+}
+
+impl From<ColorChoice> for String {
+    fn from(choice: ColorChoice) -> String {
+        match choice {
+            ColorChoice::Auto => "auto".into(),
+            ColorChoice::Rgb => "rgb".into(),
+            ColorChoice::Elevation => "elevation".into(),
+            ColorChoice::Class => "class".into(),
+            ColorChoice::None => "none".into(),
+            ColorChoice::Photo(path) => path.to_string_lossy().into_owned(),
+        }
+    }
+}
+
+/// Tells whether a text is the name of a TIFF, as a word for colours never is.
+fn is_name_of_tiff(text: &str) -> bool {
+    let ending = Path::new(text).extension().map(|ending| ending.to_ascii_lowercase());
+    ending.is_some_and(|ending| ending == "tif" || ending == "tiff")
 }
 
 /// What becomes of the slivers along the hull: flat triangles with an edge much longer than the spacing of the points, between the points

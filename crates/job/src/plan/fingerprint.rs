@@ -10,6 +10,7 @@ use crate::records::JobStep;
 use crs::geoid::errors::not_opened;
 use crs::geoid::option::HeightOffset;
 use crs::geoid::require_file;
+use orthophoto::require_file as require_photo;
 use points::lines::files_of_lines;
 use points::samples::fingerprint_of;
 use serde::{Deserialize, Serialize};
@@ -312,7 +313,8 @@ impl Fingerprint {
     }
 }
 
-/// Returns the options that only the style of the tiles depends on. A geoid grid counts by its content: it may lie elsewhere now.
+/// Returns the options that only the style of the tiles depends on. A geoid grid and an orthophoto count by their content: they may lie
+/// elsewhere now.
 fn style_of(output: &OutputOptions) -> Result<Map<String, Value>> {
     let mut style = named_values(output, "output", &["directory", "max_error"])?;
     let raster = style.get_mut("[output] raster").and_then(Value::as_object_mut);
@@ -323,6 +325,11 @@ fn style_of(output: &OutputOptions) -> Result<Map<String, Value>> {
         require_file(grid)?;
         let content = Checksum::of_file(grid).map_err(|e| not_opened(grid, e))?.1;
         style.insert("[output] height_offset".into(), format!("a grid with the checksum {content}").into());
+    }
+    if let Some(photo) = output.color.photo() {
+        require_photo(photo)?;
+        let content = fingerprint_of(InputIdentities::of(&[photo.to_path_buf()])?.samples());
+        style.insert("[output] color".into(), format!("an orthophoto with the samples {content}").into());
     }
     Ok(style)
 }

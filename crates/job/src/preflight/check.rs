@@ -24,6 +24,7 @@ use crate::publish::one_file_limits::MAX_TRIANGLES_IN_ONE_FILE;
 use crate::publish::raster::check::{check_raster, planned_raster};
 use crate::publish::terrain_tiles::check::check_terrain;
 use crate::report::skipped_inputs::write_skipped;
+use crate::tiles::vertex_colors::check_photo;
 use points::Source;
 use points::surface::SurfaceShares;
 use points::surface_warnings::{no_ground, unclear_returns};
@@ -142,6 +143,7 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     let plan = make_plan(options, LatticeCoarsening::default())?;
     check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
+    check_photo(&plan)?;
     check_raster(&plan)?;
     check_map_tiles(&plan)?;
     check_contours(&plan)?;
@@ -205,6 +207,8 @@ impl Preflight {
         let surface_sample = SurfaceShares::of_kept(&plan.sample);
         let mut warnings = plan.all_warnings();
         warnings.extend(unused_height_offset(plan));
+        // That it can be read was checked before.
+        warnings.extend(check_photo(plan).unwrap_or_default());
         let of_sample = |warning: String| format!("in a sample of the points: {warning}");
         warnings.extend(no_ground(&options.input, &plan.sample).map(of_sample));
         warnings.extend(plan.sample.notes.iter().cloned().map(of_sample));

@@ -16,6 +16,7 @@ use crate::publish::map_tiles::write_map_tiles::map_tile_memory;
 use crate::publish::raster::check::planned_raster;
 use crate::publish::raster::write_raster::raster_memory;
 use crate::publish::terrain_tiles::write_terrain::terrain_memory;
+use crate::tiles::vertex_colors::photo_memory;
 use delaunay::geometry::Bounds;
 use points::is_url;
 use std::path::{Path, PathBuf};
@@ -226,6 +227,7 @@ pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
     let is_remote = |input: &PlannedInput| input.source.path.to_str().is_some_and(is_url);
     let buffers = if plan.inputs.iter().any(is_remote) { buffers + network_memory(options) } else { buffers };
     PROCESS_MEMORY
+        + photo_memory(options)
         + leaves
             .max(levels)
             .max(buffers)

@@ -37,4 +37,5 @@ fn inputs(plan: &Plan) -> impl Iterator<Item = (&'static str, &Path)> {
     clouds
         .chain(lines.map(|path| ("[[breaklines]] files", path.as_path())))
         .chain(geoid.map(|path| ("[output] height_offset", path)))
+        .chain(plan.options.output.color.photo().map(|path| ("[output] color", path)))
 }

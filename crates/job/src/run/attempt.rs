@@ -32,6 +32,7 @@ use crate::run::phases::plan_phase::note_skipped;
 use crate::run::phases::stage_costs::stage_costs;
 use crate::run::update::first_plan_file::has_first_plan;
 use crate::run::whole_run::WholeRun;
+use crate::tiles::vertex_colors::check_photo;
 use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
 use std::sync::Mutex;
@@ -188,6 +189,7 @@ fn attempt(
     check_inputs_are_no_results(&plan)?;
     plan.warnings.extend(job.modified.clone());
     check_height_offset(&plan)?;
+    check_photo(&plan)?;
     check_raster(&plan)?;
     check_map_tiles(&plan)?;
     check_contours(&plan)?;

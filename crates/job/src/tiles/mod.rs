@@ -9,4 +9,5 @@ pub(crate) mod max_edge;
 pub(crate) mod seam;
 pub(crate) mod style;
 pub(crate) mod tile_content;
+pub(crate) mod vertex_colors;
 pub(crate) mod write_tile;

@@ -4,6 +4,7 @@ use crate::mesh::hull_rule::HullRule;
 use crate::plan::job_plan::Plan;
 use crate::tiles::clip_rule::ClipRule;
 use crate::tiles::max_edge::MaxEdgeRule;
+use crate::tiles::vertex_colors::{PhotoColors, VertexColors};
 use breaklines::Breaklines;
 use delaunay::geometry::Bounds;
 use std::sync::Arc;
@@ -21,8 +22,8 @@ use tiles::options::{ColorChoice, Hull, OutputOptions};
 pub(crate) struct TileStyle {
     /// Where lattice integers lie in a glTF scene.
     pub frame: Frame,
-    /// Where colours come from; `None` for no colours.
-    pub coloring: Option<Coloring>,
+    /// Where colours come from.
+    pub(crate) colors: VertexColors,
     /// What vertices carry of their points.
     pub attributes: AttributeChoice,
     /// Whether vertices carry normals.
@@ -69,7 +70,7 @@ impl TileStyle {
     /// spans `heights`.
     ///
     /// # Errors
-    /// Those of [`Plan::built_breaklines`].
+    /// Those of [`Plan::built_breaklines`] and of [`PhotoColors::open`].
     pub(crate) fn new(
         plan: &Plan,
         max_rgb: u16,
@@ -78,12 +79,15 @@ impl TileStyle {
         max_edge: MaxEdgeRule,
     ) -> Result<TileStyle> {
         let output = &plan.options.output;
-        let coloring = match output.color {
-            ColorChoice::None => None,
-            ColorChoice::Class => Some(Coloring::Class),
-            ColorChoice::Elevation => Some(Coloring::Elevation(heights)),
-            ColorChoice::Auto | ColorChoice::Rgb if max_rgb == 0 => Some(Coloring::Elevation(heights)),
-            ColorChoice::Auto | ColorChoice::Rgb => Some(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
+        let colors = match &output.color {
+            ColorChoice::None => VertexColors::None,
+            ColorChoice::Class => VertexColors::OfPoints(Coloring::Class),
+            ColorChoice::Elevation => VertexColors::OfPoints(Coloring::Elevation(heights)),
+            ColorChoice::Auto | ColorChoice::Rgb if max_rgb == 0 => {
+                VertexColors::OfPoints(Coloring::Elevation(heights))
+            }
+            ColorChoice::Auto | ColorChoice::Rgb => VertexColors::OfPoints(Coloring::Rgb { eight_bit: max_rgb <= 255 }),
+            ColorChoice::Photo(path) => VertexColors::OfPhoto(Box::new(PhotoColors::open(plan, path)?)),
         };
         let compression = packing(output, plan.curvature.as_ref());
         let frame = match &plan.curvature {
@@ -95,7 +99,7 @@ impl TileStyle {
         let OutputOptions { attributes, normals, .. } = *output;
         let lines = plan.built_breaklines()?;
         let clip = plan.clip.as_ref().map(|clip| ClipRule::new(clip.area(), output.selects()));
-        Ok(TileStyle { frame, coloring, attributes, normals, compression, max_edge, clip, lines, hull, copyright })
+        Ok(TileStyle { frame, colors, attributes, normals, compression, max_edge, clip, lines, hull, copyright })
     }
 
     /// Tells whether the triangle with these corners is left out because it lies outside the polygons of the clip, or is long. A lake has

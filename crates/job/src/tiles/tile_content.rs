@@ -4,6 +4,7 @@ use crate::index::TileIndex;
 use crate::records::{BorderVertex, FinishedBorder, Leaf, SeamTriangle};
 use crate::tiles::hull_slivers::HullSlivers;
 use crate::tiles::style::TileStyle;
+use crate::tiles::vertex_colors::{FoundColors, VertexColors};
 use delaunay::mesh::index::SiteIndex;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -26,16 +27,21 @@ pub(crate) struct TileContent {
     cut: Vec<[u32; 3]>,
     /// How many of them are slivers along the hull.
     pub(crate) slivers: u64,
+    /// How many sites of the leaf have no pixel in the orthophoto.
+    pub(crate) without_pixel: u64,
 }
 
 impl TileContent {
     /// Returns the content that the tile's leaf contributes.
+    ///
+    /// # Errors
+    /// Those of an orthophoto.
     pub(crate) fn of_leaf(
         mut leaf: Leaf,
         border: &FinishedBorder,
         slivers: &HullSlivers,
         style: &TileStyle,
-    ) -> TileContent {
+    ) -> Result<TileContent> {
         let mut cut = slivers.take(&leaf.positions, &mut leaf.triangles);
         let slivers = cut.len() as u64;
         cut.extend(style.take_long(&leaf.positions, &mut leaf.triangles));
@@ -44,10 +50,7 @@ impl TileContent {
         for vertex in &border.vertices {
             normals[vertex.site.get()] = vertex.normal;
         }
-        let colors = match &style.coloring {
-            Some(coloring) => coloring.colors(&leaf.positions, &leaf.rgb, &leaf.class),
-            None => Vec::new(),
-        };
+        let FoundColors { colors, without_pixel } = style.colors.of_leaf(&leaf)?;
         let Leaf { positions, class, mut intensity, triangles, .. } = leaf;
         let attributes = PointAttributes {
             classification: style.attributes.classification.then_some(class),
@@ -59,7 +62,7 @@ impl TileContent {
         };
         // As much room for the seam as the columns of the leaf have: growing would double them.
         normals.reserve_exact(positions.capacity() - positions.len());
-        TileContent { positions, normals, colors, attributes, triangles, is_used, cut, slivers }
+        Ok(TileContent { positions, normals, colors, attributes, triangles, is_used, cut, slivers, without_pixel })
     }
 
     /// Adds the triangles of the seam that `tile` owns, with the vertices that belong to neighbours. Returns the number of triangles
@@ -98,6 +101,9 @@ impl TileContent {
                 corners.iter().for_each(|&v| self.is_used[v as usize] = true);
             }
         }
+        if let VertexColors::OfPhoto(photo) = &style.colors {
+            self.colors.extend(photo.at(&self.positions[self.colors.len()..])?.colors);
+        }
         Ok((self.triangles.len() - before) as u64)
     }
 
@@ -116,7 +122,7 @@ impl TileContent {
         self.positions.push(border.position);
         self.is_used.push(false);
         self.normals.push(vertex.normal);
-        if let Some(coloring) = &style.coloring {
+        if let VertexColors::OfPoints(coloring) = &style.colors {
             self.colors.push(coloring.color(border.position[2], vertex.rgb, vertex.class as u8));
         }
         self.attributes.push(vertex.class as u8, intensity);
@@ -138,7 +144,7 @@ impl TileContent {
         Tile {
             positions: self.positions,
             normals: style.normals.then_some(self.normals),
-            colors: style.coloring.map(|_| self.colors),
+            colors: style.colors.are_wanted().then_some(self.colors),
             attributes: self.attributes,
             triangles: self.triangles,
         }

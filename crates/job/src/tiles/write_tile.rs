@@ -32,6 +32,8 @@ pub struct TileStats {
     pub cut_triangles: u64,
     /// Those of them that are slivers along the hull.
     pub slivers: u64,
+    /// Sites that have no pixel in the orthophoto.
+    pub without_pixel: u64,
     /// Bytes of the GLB files, including those of triangles that are left out.
     pub bytes: u64,
 }
@@ -43,6 +45,7 @@ impl AddAssign for TileStats {
         self.seam_triangles += other.seam_triangles;
         self.cut_triangles += other.cut_triangles;
         self.slivers += other.slivers;
+        self.without_pixel += other.without_pixel;
         self.bytes += other.bytes;
     }
 }
@@ -51,7 +54,7 @@ impl AddAssign for TileStats {
 /// `tileset.json` says of it. `border_of` returns the finished frontiers of other tiles.
 ///
 /// # Errors
-/// [`sys::Error::Io`] on the output or the store, [`sys::Error::Config`] if a triangle is too long for f32.
+/// [`sys::Error::Io`] on the output or the store, [`sys::Error::Config`] if a triangle is too long for f32; those of an orthophoto.
 pub(crate) fn write_tile(
     directory: &JobDirectory,
     store: &Store,
@@ -64,16 +67,17 @@ pub(crate) fn write_tile(
     let leaf = Leaf::load(store, tile)?;
     let border = FinishedBorder::load(store, tile)?;
     let slivers = HullSlivers::new(style.hull.as_ref(), &seam.trimmed);
-    let mut content = TileContent::of_leaf(leaf, &border, &slivers, style);
+    let mut content = TileContent::of_leaf(leaf, &border, &slivers, style)?;
     let own = seam.triangles.iter().copied().filter(|triangle| owner(triangle) == tile);
     let seam_triangles = content.add_seam(border_of, tile, own, &slivers, style)?;
-    let (left_out, slivers) = (content.left_out(), content.slivers);
+    let (left_out, slivers, without_pixel) = (content.left_out(), content.slivers, content.without_pixel);
     let kept = content.into_tile(style);
     let mut stats = TileStats {
         triangles: kept.triangles.len() as u64,
         seam_triangles,
         cut_triangles: left_out.triangles.len() as u64,
         slivers,
+        without_pixel,
         ..TileStats::default()
     };
     let mut pixels = canvas.draw(&kept)?;

@@ -41,6 +41,7 @@ use crate::run::update::changes::write_changes;
 use crate::run::update::outdated_levels::{forget_outdated_levels, key_of_tiles};
 use crate::run::whole_run::WholeRun;
 use crate::tiles::style::TileStyle;
+use crate::tiles::vertex_colors::{VertexColors, check_photo, without_pixel_warning};
 use crate::tiles::write_tile::TileStats;
 use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
@@ -355,6 +356,8 @@ fn publish(
         (placement, stats) = (placed.ok(), levels);
     }
     warnings.extend(hull_warning(plan, written.hull));
+    warnings.extend(check_photo(plan)?);
+    warnings.extend(without_pixel_warning(plan, written.stats.without_pixel));
     let raster = raster.map(|raster| {
         warnings.extend(raster.warnings);
         raster.stats
@@ -376,7 +379,10 @@ fn publish(
         flat: flat_scene(plan, &appearance.style, bounds),
         page: output.page && !page_of_others,
         copyright: output.copyright(),
-        has_ramp: matches!(appearance.style.coloring, None | Some(Coloring::Elevation(_))),
+        has_ramp: matches!(
+            appearance.style.colors,
+            VertexColors::None | VertexColors::OfPoints(Coloring::Elevation(_))
+        ),
         breaklines: lines.as_deref().map(|lines| (lines, &plan.lattice)),
     };
     let write = || write_side_files(run.directory, &content, &appearance.canvas, written.tiles);

@@ -24,6 +24,7 @@ use crate::run::finished::known_submission;
 use crate::run::phases::plan_phase::{note_skipped, write_plan};
 use crate::run::single_process;
 use crate::run::tasks::planned_job::planned;
+use crate::tiles::vertex_colors::check_photo;
 use std::time::SystemTime;
 use sys::threads::on_threads;
 use sys::{Error, disk};
@@ -60,6 +61,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     };
     check_inputs_are_no_results(&plan)?;
     check_height_offset(&plan)?;
+    check_photo(&plan)?;
     check_raster(&plan)?;
     check_map_tiles(&plan)?;
     check_contours(&plan)?;
