@@ -83,7 +83,7 @@ impl Survey {
         // The points are the same at another time.
         self.changes += 1;
         let time = SystemTime::UNIX_EPOCH + Duration::from_secs(1_500_000_000 + self.changes * 10);
-        File::options().write(true).open(self.file(0)).unwrap().set_modified(time).unwrap();
+        File::options().write(true).open(self.file(15)).unwrap().set_modified(time).unwrap();
         let said = self.update();
         assert!(said.err.contains("changed since the last run") && !said.err.contains("again"), "{said:?}");
         assert_eq!(list(&self.job.out()), before);
@@ -119,15 +119,13 @@ fn files_that_change_come_and_go() {
 }
 
 #[test]
-fn selected_vertices_and_ground_change_with_their_points() {
+fn what_depends_on_all_points_is_decided_again() {
     for options in ["max_error = 3.0", "max_edge = \"auto\"\nlevels = false"] {
         let mut survey = Survey::new(options);
         survey.update();
         survey.write(9, 500);
         survey.update();
-        let bytes = list(&survey.job.out());
         survey.has_the_bytes_of_a_run_with_the_same_cuts();
-        assert_eq!(list(&survey.job.out()), bytes);
     }
 }
 
