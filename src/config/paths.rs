@@ -65,8 +65,8 @@ pub(crate) fn as_pattern(option: &str, path: &str, base: &Path) -> (String, Opti
 
 fn meant_alone(option: &str, name: &str, other: &str) -> String {
     format!(
-        "{option}: something is called {name}, so only that is meant, although the pattern matches {other} too: name {other} as well, or \
-         rename {name}"
+        "{option}: {name} is the name of a file, so it is no pattern, and {other} is not read; fix: name {other} as well, or rename \
+         {name}"
     )
 }
 

@@ -21,6 +21,14 @@ impl fmt::Display for ShownWarning<'_> {
     }
 }
 
+/// Returns an error as people see it: what is wrong, and, on a line of its own, what to do about it, if it says so.
+pub fn with_remedy_below(error: &str) -> String {
+    match error.rsplit_once(FIX) {
+        Some((what, fix)) => format!("{what}\n  fix: {fix}"),
+        None => error.into(),
+    }
+}
+
 /// Warnings in the order in which they were found. Each is a full sentence without a final full stop, and may go on with `; fix: ` and what
 /// to do.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,5 +94,7 @@ mod tests {
     fn a_remedy_has_a_line_of_its_own() {
         assert_eq!(ShownWarning("unit unknown; fix: set\nit").to_string(), "warning: unit unknown\n  fix: set\\nit");
         assert_eq!(ShownWarning("rounded").to_string(), "warning: rounded");
+        assert_eq!(with_remedy_below("line 2:\n  a; fix: b"), "line 2:\n  a\n  fix: b");
+        assert_eq!(with_remedy_below("gone"), "gone");
     }
 }

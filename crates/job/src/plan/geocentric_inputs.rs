@@ -71,8 +71,8 @@ pub(crate) fn warn_of_geocentric(sources: &[Source], options: &InputOptions, war
     let found: Vec<&Source> = sources.iter().filter(|source| source.looks_geocentric()).collect();
     if let Some(first) = found.first() {
         warnings.push(format!(
-            "{}{}: its coordinates look geocentric: x, y and z, around {:.0}, {:.0} and {:.0}, lie on the surface of the earth, and z is no \
-             height. {TRANSFORM}. If they are a plane, set [input] crs = \"none\"",
+            "{}{}: its coordinates (around {:.0}, {:.0}, {:.0}) look geocentric, so z is not a height; fix: {TRANSFORM}; [input] crs = \
+             \"none\" if x and y are a plane",
             if sources.len() == 1 { String::new() } else { format!("{} of {} inputs, such as ", found.len(), sources.len()) },
             first.path.display(),
             first.min[0],
@@ -93,8 +93,8 @@ pub(crate) fn warn_of_degrees(sources: &[Source], options: &InputOptions, warnin
     let found: Vec<&Source> = sources.iter().filter(is_meant).collect();
     if let Some(first) = found.first() {
         warnings.push(format!(
-            "{}{}: its x and y, from {} to {} and from {} to {}, look like longitude and latitude, and are taken as lengths. If they are \
-             degrees, set [input] crs = \"EPSG:4326\" and to_crs = \"utm\"; if they are a plane, set crs = \"none\"",
+            "{}{}: its x ({} to {}) and y ({} to {}) look like longitude and latitude, but are taken as lengths; fix: [input] crs = \
+             \"EPSG:4326\" and [input] to_crs = \"utm\" for degrees, [input] crs = \"none\" for a plane",
             if sources.len() == 1 { String::new() } else { format!("{} of {} inputs, such as ", found.len(), sources.len()) },
             first.path.display(),
             first.min[0],

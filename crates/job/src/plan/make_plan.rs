@@ -58,7 +58,8 @@ pub fn make_plan(options: &JobOptions, coarsening: LatticeCoarsening) -> crate::
     refuse_contradicting_options(options)?;
     set_network_memory(network_memory(options));
     let named = named_inputs(&options.input)?;
-    let (sources, skipped) = open_all(&named.paths, &options.input, &row_choice(options))?;
+    let (sources, mut skipped) = open_all(&named.paths, &options.input, &row_choice(options))?;
+    skipped.extend(named.skipped);
     let mut plan = plan_sources(sources, skipped, options, coarsening)?;
     let mut notes = Warnings::default();
     notes.extend(named.notes);
@@ -178,10 +179,12 @@ fn try_plan(
     if metres_z != metres {
         let other = match unit_choice {
             UnitChoice::Auto => "",
-            _ => ". [input] unit is that of x and y alone: the CRS or the columns state that of heights",
+            _ => {
+                "; fix: a CRS with a vertical part if the unit of heights is wrong: [input] unit sets that of x and y alone"
+            }
         };
         warnings.push(format!(
-            "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z{other}"
+            "heights are in another unit than x and y ({metres_z} m and {metres} m): the tiles have all in metres{other}"
         ));
     }
     let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;

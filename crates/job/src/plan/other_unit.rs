@@ -100,8 +100,8 @@ pub(super) fn warn_of_dropped_units(
     let [plane, heights] = metres.map(name);
     let taken = if plane == heights { plane } else { format!("{plane}, and z in {heights}") };
     warnings.push(format!(
-        "[input] crs = \"none\" leaves records of coordinate systems aside, and the coordinates are taken in {taken}, though {} of {} inputs \
-         state another unit, such as {}: {what}. If the file is right, leave crs out, or set [input] unit to its unit",
+        "[input] crs = \"none\" ignores the unit that {} of {} inputs state, such as {} ({what}): coordinates are taken to be in \
+         {taken}; fix: if the file is right, leave [input] crs out, or set [input] unit",
         others.len(),
         sources.len(),
         first.path.display()

@@ -143,7 +143,7 @@ pub(crate) fn farthest_row(sources: &[Source], options: &JobOptions, extent: &Ex
     }
     let size = extent.size(0).max(extent.size(1)).max(extent.size(2));
     Ok(farthest.filter(|(distance, _)| 4.0 * distance >= 3.0 * size).map(|(_, row)| {
-        format!("the row farthest from the others is {row}; if it is a mistake, remove it or leave it out with [input] bounds")
+        format!("the row farthest from the others is {row}; fix: remove it, or leave it out with [input] bounds, if it is a mistake")
     }))
 }
 
@@ -164,7 +164,8 @@ pub fn stop_at<'a>(
     Error::input(
         &source.path,
         format!(
-            "{what}. Repair the file, leave it out (on_bad_file = \"skip\"), or raise max_malformed_fraction to read the rest"
+            "{what}; fix: copy or repair the file, leave it out with [input] on_bad_file = \"skip\", or raise [input] \
+             max_malformed_fraction to read the rest"
         ),
     )
 }

@@ -75,8 +75,7 @@ fn convert_heights(file: &mut LineFile, own: &Crs, points: &SystemOfPoints) {
         // Without a unit of height, heights are in the unit of x and y.
         if plane.is_some_and(|plane| !same_length(plane, to)) {
             file.warnings.push(format!(
-                "it does not say the unit of its heights: it is taken to be {}, as that of the points (set height_unit in [[breaklines]] to \
-                 say otherwise)",
+                "it has no unit of heights: {} assumed, as for the points; fix: [[breaklines]] height_unit, if that is wrong",
                 unit_name(to)
             ));
         }
@@ -86,7 +85,7 @@ fn convert_heights(file: &mut LineFile, own: &Crs, points: &SystemOfPoints) {
         scale_heights(file, from / to);
         let why = match points.crs.vertical {
             Some(_) => "the unit of the points' heights",
-            None => "the unit of x and y, since the points do not say the unit of their heights",
+            None => "the unit of x and y, because the points have no unit of heights",
         };
         file.warnings.push(format!("its heights are converted from {} to {}, {why}", unit_name(from), unit_name(to)));
     }
@@ -106,14 +105,14 @@ fn unit_name(metres: f64) -> String {
 fn warn_of_missing(file: &mut LineFile, own: &Crs, points: &Crs) {
     if points.is_named() && file.warnings.is_empty() {
         file.warnings.push(format!(
-            "it says no CRS: its {} are taken to be in that of the points, {}",
+            "it has no CRS: its {} are taken to be in that of the points, {}",
             file.purpose.features(),
             points.label()
         ));
     }
     if own.is_named() {
         file.warnings.push(format!(
-            "its {} are in {}, and the points say no CRS: they are taken to be in the same",
+            "its {} are in {}, and the points have no CRS: the same assumed for them; fix: [input] crs, if that is wrong",
             file.purpose.features(),
             own.label()
         ));
@@ -121,7 +120,7 @@ fn warn_of_missing(file: &mut LineFile, own: &Crs, points: &Crs) {
 }
 
 fn assumed(names: &str) -> String {
-    format!("not both datums are named: {names} are assumed to be one; two datums may be hundreds of metres apart")
+    format!("a datum is unknown: {names} are assumed to be one, though two datums may be hundreds of metres apart")
 }
 
 /// Transforms the features of `file`, which are in the system `own`, into that of the points.
@@ -167,9 +166,9 @@ fn transform(file: &mut LineFile, own: &Crs, points: &SystemOfPoints, has_height
     match way.datums() {
         DatumNote::Same => {}
         DatumNote::Assumed(names) => file.warnings.push(assumed(names)),
-        DatumNote::TakenAlike(names) if file.purpose == LinePurpose::Breaklines => file
-            .warnings
-            .push(format!("[input] datums = \"close\" takes {names} for one datum; they may be a metre or two apart")),
+        DatumNote::TakenAlike(names) if file.purpose == LinePurpose::Breaklines => file.warnings.push(format!(
+            "no datum shift between {names}, which may be a metre or two apart ([input] datums = \"close\")"
+        )),
         DatumNote::TakenAlike(names) => {
             file.warnings.push(format!("no datum shift between {names}, which may be a metre or two apart"));
         }

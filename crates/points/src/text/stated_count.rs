@@ -56,9 +56,11 @@ pub(crate) fn count_warning(counts: &[StatedCount], rows: u64) -> Option<String>
     }
     let StatedCount { points, comment } = first;
     Some(if *points > rows {
-        format!("the comment {comment} promises {points} points, but the file has only {rows}: it may be cut off")
+        format!(
+            "the comment {comment} gives {points} points, but the file has only {rows}: it may be cut off; fix: copy the file again"
+        )
     } else {
-        format!("the comment {comment} promises {points} points, but the file has {rows}: all of them are read")
+        format!("the comment {comment} gives {points} points, but the file has {rows}: all are read")
     })
 }
 

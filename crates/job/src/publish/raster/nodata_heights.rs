@@ -63,16 +63,15 @@ impl NodataPoints {
         let warning = format!("{file} has the height {height} in {cells}, and {height} stands for nodata there");
         if self.first.is_empty() {
             return format!(
-                "{warning}: no point has this height, it is between the heights of points; set [output.raster] nodata = \"nan\" or \
-                 another number"
+                "{warning}: it lies between the heights of points; fix: [output.raster] nodata = \"nan\", or another number"
             );
         }
         let place = |[x, y]: &[i32; 2]| format!("({}, {})", lattice.world_text(0, *x), lattice.world_text(1, *y));
         let places: Vec<String> = self.first.iter().map(place).collect();
         let more = if self.are_more { " and other places" } else { "" };
         format!(
-            "{warning}: points at {}{more} have it; if it stands for nodata in the input too, leave these points out with [input] nodata = \
-             {height}; if it is a height, set [output.raster] nodata = \"nan\" or another number",
+            "{warning}: points at {}{more} have it; fix: [input] nodata = {height} if it stands for nodata in the input too, otherwise \
+             [output.raster] nodata = \"nan\" or another number",
             places.join(", ")
         )
     }
