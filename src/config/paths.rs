@@ -145,7 +145,7 @@ mod tests {
         assert!(
             warning
                 .unwrap()
-                .contains("something is called a[1].laz, so only that is meant, although the pattern matches a1.laz")
+                .contains("a[1].laz is the name of a file, so it is no pattern, and a1.laz is not read")
         );
         // Folders too.
         std::fs::create_dir(folder.path().join("d [2]")).unwrap();

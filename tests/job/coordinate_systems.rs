@@ -110,7 +110,7 @@ fn the_cure_of_a_geocentric_system_is_one_that_helps() {
         Job::on(&[&bare, &map]).with("input", line).run().refused(2, &[words[0], words[1], key]);
     }
     // The user states a CRS already, or the other file does.
-    let full = "The record is ignored: unless [input] crs, missing_crs or another file states";
+    let full = "the record is ignored";
     let short = "its record of a geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored: [input] states";
     for (files, line, words) in [
         (vec![&false_record], "crs = \"EPSG:26915\"", [short, full]),
@@ -164,7 +164,7 @@ fn the_unit_of_a_false_record_gives_way_to_every_other_statement() {
     assert!(said.contains("no input states a known unit of length: metres assumed; fix: set [input] unit"), "{said}");
     let said = warnings(&Job::on(&[&in_metres]).report());
     assert!(
-        said.contains("taken as a plane in the unit metre") && !said.contains("no input states a known unit"),
+        said.contains("x and y are a plane in metre") && !said.contains("no input states a known unit"),
         "{said}"
     );
 }
@@ -265,7 +265,7 @@ fn units_and_datums_of_height_are_told_apart() {
         let job = Job::on(&files);
         let said = warnings(&job.report());
         assert!(
-            said.contains("1 of 2 inputs do not say the unit of their heights") && said.contains("plane.las"),
+            said.contains("1 of 2 inputs have no unit of heights") && said.contains("plane.las"),
             "{said}"
         );
         let georeference: Value =
@@ -294,13 +294,13 @@ fn a_file_of_unknown_datum_does_not_let_two_datums_pass() {
         let report = Job::on(&files).report();
         let said = warnings(&report);
         assert!(
-            said.contains("1 of 2 inputs do not say their datum, such as") && said.contains("unknown.las"),
+            said.contains("1 of 2 inputs have no datum, such as") && said.contains("unknown.las"),
             "{said}"
         );
         assert!(said.contains("taken to be GCS_North_American_1983"), "{said}");
         assert_eq!(report["crs"], "UTM_15N");
     }
-    assert!(!warnings(&Job::on(&[&unknown]).report()).contains("do not say their datum"));
+    assert!(!warnings(&Job::on(&[&unknown]).report()).contains("have no datum"));
 }
 
 #[test]

@@ -356,6 +356,6 @@ fn colours_that_cannot_be_read_do_not_stop_a_job() {
     let rows: String = centimetres(50, plain).lines().skip(1).map(|row| format!("{row},red,-5,0x1\n")).collect();
     let text = Text::new(&format!("x,y,z,r,g,b\n{rows}"));
     let (report, _) = run(&text.job());
-    assert!(report["warnings"].to_string().contains("they are left out"), "{report}");
+    assert!(report["warnings"].to_string().contains("and are ignored"), "{report}");
     run(&text.job().with("output", "color = \"elevation\""));
 }

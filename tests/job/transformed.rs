@@ -184,7 +184,7 @@ fn a_crs_for_files_without_one_and_for_those_with_a_false_one() {
         let job = job(file, line);
         let report = job.report();
         assert_eq!(job.verified()["digest"].as_str().unwrap(), expected, "{line}");
-        assert_eq!(warnings(&report).contains("say otherwise, such as"), file == &wrong, "{report}");
+        assert_eq!(warnings(&report).contains("overrides the CRS of"), file == &wrong, "{report}");
     }
     job(&plain, "").run().refused(2, &["plain.las", "names no CRS", "missing_crs"]);
     job(&plain, "crs = \"none\"").run().refused(2, &["to_crs needs to know"]);

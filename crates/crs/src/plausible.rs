@@ -80,7 +80,7 @@ mod tests {
         let warned = |crs: &Crs, min: [f64; 3], max: [f64; 3]| {
             let mut warnings = Warnings::default();
             assert_eq!(plausible(crs.clone(), min, max, &mut warnings), *crs);
-            warnings.iter().any(|warning| warning.contains("as longitudes and latitudes are"))
+            warnings.iter().any(|warning| warning.contains("look like longitude and latitude"))
         };
         let utm = from_epsg(25832).unwrap();
         let (low, high) = ([11.5, 48.1, 500.0], [11.6, 48.2, 600.0]);

@@ -106,7 +106,7 @@ mod tests {
                 "surface = \"first\"",
                 "25 % of the points (50 of 200) do not say clearly which return of how many they are: one without",
             ),
-            ("returns = \"last\"", "counts as the last"),
+            ("returns = \"last\"", "last returns if"),
             ("returns = [2]", "number 1"),
         ] {
             let warning = unclear_returns(&options(text), &counts).unwrap();

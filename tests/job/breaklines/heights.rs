@@ -321,7 +321,7 @@ fn a_constant_factor_is_named() {
         (FOOT.powi(-2), "its heights are 10.76 times too high, as if they had been converted"),
     ] {
         let text = said(&survey, on_slope(|_, z| z * factor), "");
-        assert!(text.contains(words) && !text.contains("another zero"), "{factor}: {text}");
+        assert!(text.contains(words) && !text.contains("another datum"), "{factor}: {text}");
     }
 }
 

@@ -79,7 +79,7 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
             ("64-bit count of 2^40", 247, (1u64 << 40).to_le_bytes().to_vec(), Refused(2, "2^40")),
             ("64-bit count too large", 247, 201u64.to_le_bytes().to_vec(), Refused(3, "holds 201 records, but 1 of")),
             ("64-bit count too small", 247, 150u64.to_le_bytes().to_vec(), Read(150, 0, "")),
-            ("two counts", 107, vec![0xff; 4], Read(COUNT, 0, "two point counts differ")),
+            ("two counts", 107, vec![0xff; 4], Read(COUNT, 0, "two point counts")),
             ("no count", 247, vec![0; 8], Refused(3, "no point is left")),
             ("points by return", 255, vec![0xff; 120], Read(COUNT, 0, "")),
         ]);

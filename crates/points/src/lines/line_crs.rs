@@ -255,7 +255,7 @@ mod tests {
         let taken = bring(&Crs::default(), "auto", &zone_15).unwrap();
         assert!(taken.iter().any(|warning| warning.contains("says no CRS")));
         let without = bring(&zone_15, "auto", &Crs::default()).unwrap();
-        assert!(without.iter().any(|warning| warning.contains("the points say no CRS")));
+        assert!(without.iter().any(|warning| warning.contains("the points have no CRS")));
         for points in [&zone_15, &Crs::default()] {
             assert!(bring(&degrees, "points", points).unwrap().is_empty());
         }
@@ -371,6 +371,6 @@ mod tests {
     fn depths_over_heights_are_named() {
         let depths = Crs { vertical: Some(1.0), ..system("EPSG:26915+6357") };
         let (_, said) = height(&depths, "", &system("EPSG:26915"));
-        assert!(said.contains("counts downwards"), "{said}");
+        assert!(said.contains("is a depth"), "{said}");
     }
 }
