@@ -143,9 +143,7 @@ mod tests {
         let (escaped, warning) = pattern("a[1].laz");
         assert_eq!(escaped, "a[[]1[]].laz");
         assert!(
-            warning
-                .unwrap()
-                .contains("a[1].laz is the name of a file, so it is no pattern, and a1.laz is not read")
+            warning.unwrap().contains("a[1].laz is the name of a file, so it is no pattern, and a1.laz is not read")
         );
         // Folders too.
         std::fs::create_dir(folder.path().join("d [2]")).unwrap();

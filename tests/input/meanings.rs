@@ -235,7 +235,10 @@ fn degrees_that_no_name_tells_are_a_warning() {
     let rows: String = (0..50).map(row).collect();
     for header in ["X,Y,Z\n", "POINT_X,POINT_Y,POINT_Z\n", ""] {
         let cloud = text(&format!("{header}{rows}")).unwrap();
-        assert!(first_warning(&cloud).contains("look like longitude and latitude, but are taken as lengths"), "{header:?}");
+        assert!(
+            first_warning(&cloud).contains("look like longitude and latitude, but are taken as lengths"),
+            "{header:?}"
+        );
     }
     assert_eq!(first_warning(&text(&format!("x [m],y [m],z [m]\n{rows}")).unwrap()), "");
     // A scanner's own coordinates.

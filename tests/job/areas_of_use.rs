@@ -260,10 +260,7 @@ fn longitudes_beyond_180_degrees_are_taken_without_whole_turns_and_with_a_warnin
     };
     let (west, turned) = (job("west.csv", -118.2), job("turned.csv", 241.8));
     assert_eq!((&west["crs"], &west["points"]), (&turned["crs"], &turned["points"]));
-    assert!(
-        warnings(&turned).contains("lie beyond 180 degrees, and are taken as -118.2"),
-        "{turned}"
-    );
+    assert!(warnings(&turned).contains("lie beyond 180 degrees, and are taken as -118.2"), "{turned}");
     assert!(!warnings(&west).contains("beyond 180 degrees"), "{west}");
 }
 
@@ -347,10 +344,7 @@ fn a_site_s_own_grid_under_a_map_is_named_however_near_its_area_is() {
     ] {
         let file = csv(&folder, name, place, 7.0);
         let said = warnings(&Job::on(&[&file]).with("input", &format!("crs = \"EPSG:{crs}\"")).report());
-        assert!(
-            said.contains("fix: [input] crs = "),
-            "{name} {said}"
-        );
+        assert!(said.contains("fix: [input] crs = "), "{name} {said}");
     }
     // Uganda beside its zone, at the equator.
     let right = csv(&folder, "right.csv", [140_000.0, 40_000.0], 7.0);
@@ -401,7 +395,8 @@ fn a_text_whose_unit_contradicts_its_code_is_judged_by_the_area_of_the_code() {
 fn a_file_without_a_crs_beside_others_is_told_so_and_the_cure_helps() {
     let folder = tempfile::tempdir().unwrap();
     let named = las(&folder, "named.las", PLACE);
-    let assumed = "it has no CRS, and that of the other files is assumed: in ETRS89 / UTM zone 32N (EPSG:25832), its points";
+    let assumed =
+        "it has no CRS, and that of the other files is assumed: in ETRS89 / UTM zone 32N (EPSG:25832), its points";
     for (name, place, missing) in [
         ("prefixed.las", [32_500_010.0, 5_500_010.0], "EPSG:4647"),
         ("nowhere.las", [50_000_000.0, 5_500_000.0], "EPSG:..."),

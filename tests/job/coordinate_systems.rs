@@ -163,10 +163,7 @@ fn the_unit_of_a_false_record_gives_way_to_every_other_statement() {
     let said = warnings(&Job::on(&[&silent]).report());
     assert!(said.contains("no input states a known unit of length: metres assumed; fix: set [input] unit"), "{said}");
     let said = warnings(&Job::on(&[&in_metres]).report());
-    assert!(
-        said.contains("x and y are a plane in metre") && !said.contains("no input states a known unit"),
-        "{said}"
-    );
+    assert!(said.contains("x and y are a plane in metre") && !said.contains("no input states a known unit"), "{said}");
 }
 
 #[test]
@@ -264,10 +261,7 @@ fn units_and_datums_of_height_are_told_apart() {
     for files in [[&plane, &feet], [&feet, &plane]] {
         let job = Job::on(&files);
         let said = warnings(&job.report());
-        assert!(
-            said.contains("1 of 2 inputs have no unit of heights") && said.contains("plane.las"),
-            "{said}"
-        );
+        assert!(said.contains("1 of 2 inputs have no unit of heights") && said.contains("plane.las"), "{said}");
         let georeference: Value =
             serde_json::from_slice(&fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
         // However the file rounds it.
@@ -293,10 +287,7 @@ fn a_file_of_unknown_datum_does_not_let_two_datums_pass() {
     for files in [[&unknown, &nad83], [&nad83, &unknown]] {
         let report = Job::on(&files).report();
         let said = warnings(&report);
-        assert!(
-            said.contains("1 of 2 inputs have no datum, such as") && said.contains("unknown.las"),
-            "{said}"
-        );
+        assert!(said.contains("1 of 2 inputs have no datum, such as") && said.contains("unknown.las"), "{said}");
         assert!(said.contains("taken to be GCS_North_American_1983"), "{said}");
         assert_eq!(report["crs"], "UTM_15N");
     }

@@ -65,7 +65,11 @@ const IN_INPUT: [(&str, &[&str]); 19] = [
 ];
 
 /// A line for `[output]`, and what the message has.
-const IN_OUTPUT: [(&str, &[&str]); 16] = [
+const IN_OUTPUT: [(&str, &[&str]); 17] = [
+    (
+        "[output.raster]\nresolution = 1.0\npmtiles = true",
+        &["line 7: [output.raster] pmtiles takes \"terrarium\" or \"terrain-rgb\""],
+    ),
     ("raster = 2.0", &["line 5: [output] raster takes a table", "did you mean raster = { resolution = 2.0 }?"]),
     ("[output.raster]\norigin = [0, 0]", &["line 5: [output.raster] has no key resolution", "resolution = 1.0"]),
     (

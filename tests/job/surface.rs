@@ -89,8 +89,11 @@ fn each_surface_keeps_its_classes_and_returns_in_every_format() {
             assert_eq!(same(name)[0], same(name)[1], "{lines} {name}");
         }
         assert_eq!(las["points"]["classes"], csv["points"]["classes"]);
-        let unclear =
-            las["warnings"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains("have no valid return number"));
+        let unclear = las["warnings"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|w| w.as_str().unwrap().contains("have no valid return number"));
         assert_eq!(unclear, lines.contains("return") || lines.contains("first") || lines.contains("last"), "{lines}");
     }
 }

@@ -7,7 +7,7 @@ use crs::choice::CrsChoice;
 use crs::system::{Crs, CrsKind};
 use crs::transform::between::{CrsTransform, DatumNote};
 use rust_decimal::prelude::ToPrimitive;
-use sys::Warnings;
+use sys::{Warnings, of_inputs};
 
 /// Metres of a degree of latitude, about.
 const DEGREE: f64 = 111_200.0;
@@ -28,11 +28,9 @@ pub(crate) fn warn_of_overruled(sources: &[Source], said: &[Crs], options: &Inpu
     let others: Vec<_> = all().filter(|pair| !differences(*pair).is_empty()).collect();
     if let Some((first, crs)) = others.first() {
         warnings.push(format!(
-            "[input] crs ({}) overrides the CRS of {} of {} inputs, such as {}: {} differs in {}",
+            "{}[input] crs ({}) overrides its CRS: {} differs in {}",
+            of_inputs(others.len(), sources.len(), &first.path),
             crs.label(),
-            others.len(),
-            sources.len(),
-            first.path.display(),
             if first.crs.is_named() { first.crs.label() } else { "it".to_string() },
             crs.differences(&first.crs).join(" and ")
         ));
@@ -66,11 +64,9 @@ pub(crate) fn warn_of_heights(sources: &[Source], said: &[Crs], warnings: &mut W
     let silent: Vec<&Source> = sources.iter().zip(said).filter(|(_, crs)| is_silent(crs)).map(|pair| pair.0).collect();
     if let Some(first) = silent.first() {
         warnings.push(format!(
-            "{} of {} inputs are in degrees and have no unit of heights, such as {}: metres assumed; fix: a CRS with a vertical part, \
-             such as [input] crs = \"EPSG:4269+6360\" for US survey feet, if that is wrong",
-            silent.len(),
-            sources.len(),
-            first.path.display()
+            "{}its heights have no unit: metres assumed; fix: a CRS with a vertical part, such as [input] crs = \"EPSG:4269+6360\" for \
+             US survey feet, if that is wrong",
+            of_inputs(silent.len(), sources.len(), &first.path)
         ));
     }
 }
@@ -101,18 +97,16 @@ pub(crate) fn warn_of_datums(sources: &[Source], notes: &[DatumNote], warnings: 
     let alike = all(&|note| if let DatumNote::TakenAlike(names) = note { Some(names.clone()) } else { None });
     if let Some((first, names)) = alike.first() {
         warnings.push(format!(
-            "{}{}: no datum shift between {names}, which may be a metre or two apart ([input] datums = \"close\")",
-            such_as(alike.len(), sources.len()),
-            first.path.display()
+            "{}no datum shift between {names}, which may be a metre or two apart ([input] datums = \"close\")",
+            of_inputs(alike.len(), sources.len(), &first.path)
         ));
     }
     let assumed = all(&|note| if let DatumNote::Assumed(names) = note { Some(names.clone()) } else { None });
     if let Some((first, names)) = assumed.first() {
         warnings.push(format!(
-            "{}{}: its datum is unknown, and {names} are assumed to be one; fix: [input] crs, because two datums may be hundreds of \
-             metres apart",
-            such_as(assumed.len(), sources.len()),
-            first.path.display()
+            "{}its datum is unknown, and {names} are assumed to be one; fix: [input] crs, because two datums may be hundreds of metres \
+             apart",
+            of_inputs(assumed.len(), sources.len(), &first.path)
         ));
     }
 }
@@ -177,8 +171,4 @@ fn ground_of_metre(to: &Crs, [x, y]: [f64; 2]) -> Option<f64> {
 
 fn of_all(some: usize, all: usize) -> String {
     if all == 1 { String::new() } else { format!("{some} of {all} inputs: ") }
-}
-
-fn such_as(some: usize, all: usize) -> String {
-    if all == 1 { String::new() } else { format!("{some} of {all} inputs, such as ") }
 }

@@ -21,6 +21,15 @@ impl fmt::Display for ShownWarning<'_> {
     }
 }
 
+/// Returns how a warning about `some` of `all` inputs begins: with the `first` of them.
+pub fn of_inputs(some: usize, all: usize, first: &Path) -> String {
+    if all == 1 {
+        format!("{}: ", first.display())
+    } else {
+        format!("{some} of {all} inputs, such as {}: ", first.display())
+    }
+}
+
 /// Returns an error as people see it: what is wrong, and, on a line of its own, what to do about it, if it says so.
 pub fn with_remedy_below(error: &str) -> String {
     match error.rsplit_once(FIX) {
@@ -96,5 +105,7 @@ mod tests {
         assert_eq!(ShownWarning("rounded").to_string(), "warning: rounded");
         assert_eq!(with_remedy_below("line 2:\n  a; fix: b"), "line 2:\n  a\n  fix: b");
         assert_eq!(with_remedy_below("gone"), "gone");
+        assert_eq!(of_inputs(1, 1, Path::new("a.laz")), "a.laz: ");
+        assert_eq!(of_inputs(1, 2, Path::new("a.laz")), "1 of 2 inputs, such as a.laz: ");
     }
 }

@@ -70,7 +70,10 @@ fn what_encloses_nothing_or_is_no_area_is_named() {
     let back = vec![SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[1]];
     for (rings, words) in [
         (&[eight][..], "feature 1 is a lake whose outlines cross, so water and land alternate at (500070, 4000070)"),
-        (&[square.clone(), beyond], "feature 1 is a lake whose outlines cross, so water and land alternate at (500100, 40000"),
+        (
+            &[square.clone(), beyond],
+            "feature 1 is a lake whose outlines cross, so water and land alternate at (500100, 40000",
+        ),
         (
             &[square.clone(), BESIDE.to_vec()],
             "feature 1 is a lake with a hole outside its outline, which is taken for water at (500110, 4000040)",

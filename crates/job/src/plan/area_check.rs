@@ -12,7 +12,7 @@ use points::Source;
 use points::options::{InputOptions, OutsideCrsArea};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
-use sys::Warnings;
+use sys::{Warnings, of_inputs};
 
 /// Surveys and zones reach some hundred kilometres beyond the area of use. Farther out, in degrees of arc, there is a warning.
 const DOUBTFUL: f64 = 3.0;
@@ -87,13 +87,10 @@ pub(crate) fn check_places(
         refuse_hopeless(&outside, is_assumed)?;
     }
     if let Some((source, first)) = outside.first() {
-        let count = match sources.len() {
-            1 => String::new(),
-            all => format!("{} of {all} inputs, such as ", outside.len()),
-        };
+        let of = of_inputs(outside.len(), sources.len(), &source.path);
         let nothing = if first.is_hopeless() || first.is_local { "" } else { NOTHING_TO_DO };
         let sentence = first.sentence(source, is_assumed(source));
-        warnings.push(format!("{count}{}: {sentence}{nothing}", source.path.display()));
+        warnings.push(format!("{of}{sentence}{nothing}"));
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use crs::{ComparableCrs, Crs, CrsChoice, Unit, same_length};
 use points::options::UnitChoice;
 use points::{FileFormat, Source};
 use std::borrow::Cow;
-use sys::{Error, Result, Warnings};
+use sys::{Error, Result, Warnings, of_inputs};
 
 /// Lengths of units that differ by less are two kinds of foot.
 const FEET_APART: f64 = 1e-5;
@@ -68,11 +68,9 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warn
         said.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
     if let Some((first, differences)) = overruled.first() {
         warnings.push(format!(
-            "[input] crs ({}) overrides the CRS of {} of {} inputs, such as {}: {} differs in {}",
+            "{}[input] crs ({}) overrides its CRS: {} differs in {}",
+            of_inputs(overruled.len(), sources.len(), &first.source.path),
             if crs.is_named() { crs.label() } else { format!("a plane in {}", crs.horizontal.name()) },
-            overruled.len(),
-            sources.len(),
-            first.source.path.display(),
             if first.crs.is_named() { first.crs.label() } else { "it".to_string() },
             differences.join(" and ")
         ));
@@ -253,9 +251,8 @@ fn warn_of_depths(said: &[StatedCrs], crs: &Crs, warnings: &mut Warnings) {
     let downward: Vec<(&StatedCrs, String)> = said.iter().filter_map(|s| Some((s, s.crs.depths()?))).collect();
     let Some((first, doubt)) = downward.first() else { return };
     warnings.push(format!(
-        "{}{}: {doubt}, or set [input] crs, if the record is wrong",
-        if count == 1 { String::new() } else { format!("{} of {count} inputs, such as ", downward.len()) },
-        first.source.path.display()
+        "{}{doubt}, or set [input] crs, if the record is wrong",
+        of_inputs(downward.len(), count, &first.source.path)
     ));
     let silent: Vec<&StatedCrs> = said.iter().filter(|s| s.crs.vertical_system.is_none()).collect();
     if let (Some(_), Some(first)) = (crs.depths(), silent.first()) {
@@ -282,12 +279,10 @@ fn warn_of_other_units(sources: &[Source], choice: &CrsChoice, chosen: Unit, war
     let others: Vec<&Source> = sources.iter().filter(is_other).collect();
     if let Some(first) = others.first() {
         warnings.push(format!(
-            "[input] unit ({}) overrides the {} of {} of {} inputs, such as {}: {}",
+            "{}[input] unit ({}) overrides the unit of its {} ({})",
+            of_inputs(others.len(), sources.len(), &first.path),
             chosen.name(),
             if first.format == FileFormat::Text { "columns" } else { "records" },
-            others.len(),
-            sources.len(),
-            first.path.display(),
             first.crs.horizontal.name()
         ));
     }

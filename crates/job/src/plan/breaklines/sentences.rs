@@ -26,21 +26,21 @@ pub(super) fn sentences(
     found.extend(findings.worst_uneven.first().map(|worst| names.uneven(worst)));
     if findings.empty_paths > 0 {
         found.push(format!(
-            "[[breaklines]]: {} parts of features are left out: they are smaller than a step of the lattice, or a hole covers them",
-            findings.empty_paths
+            "[[breaklines]]: {} left out: smaller than a step of the lattice, or covered by a hole",
+            one_or_several(findings.empty_paths, ["part of a feature is", "parts of features are"])
         ));
     }
     if findings.rivers_without_heights > 0 {
         found.push(format!(
-            "[[breaklines]]: {} rivers take their heights from the points around: whether they rise is not checked",
-            findings.rivers_without_heights
+            "[[breaklines]]: whether {} downstream is not checked: heights come from the points around",
+            one_or_several(findings.rivers_without_heights, ["river rises", "rivers rise"])
         ));
     }
     if findings.places_not_compared > 0 {
         found.push(format!(
-            "[[breaklines]]: at {} places a line with heights meets one that takes them from the points around: whether they disagree \
-             is not checked",
-            findings.places_not_compared
+            "[[breaklines]]: at {} a line with heights meets one that takes them from the points around: whether they disagree is not \
+             checked",
+            counted(findings.places_not_compared, "place")
         ));
     }
     found
@@ -92,9 +92,9 @@ impl Names<'_> {
 
     fn disagreement(&self, &Disagreement { place, kept, other }: &Disagreement) -> String {
         format!(
-            "[[breaklines]]: heights disagree at {} places where lines meet; the worst is {}: {} has the height {}, which is used, and \
-             {} has {} (a lake goes before a river, a river before a line, the lower before the higher)",
-            self.findings.disagreements,
+            "[[breaklines]]: heights disagree at {} where lines meet; the worst is {}: {} has the height {}, which is used, and {} has \
+             {} (a lake goes before a river, a river before a line, the lower before the higher)",
+            counted(self.findings.disagreements, "place"),
             self.at(place),
             self.feature(kept.0),
             self.height(kept.1),
