@@ -57,7 +57,10 @@ pub fn load(path: &Path) -> Result<JobOptions> {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-            return Err(Error::Config(format!("there is no configuration file {}", path.display())));
+            return Err(Error::Config(format!(
+                "there is no configuration file {}; fix: correct its name, or write one with `gdt-batch init`",
+                path.display()
+            )));
         }
         Err(e) => return Err(Error::Config(format!("cannot read the configuration {}: {e}", path.display()))),
     };

@@ -26,9 +26,8 @@ pub(crate) fn stated_crs(source: &Source, all: &[Source], options: &InputOptions
     };
     if !named.is_named() {
         return Err(Error::Config(format!(
-            "{}: it names no CRS{}, and [input] to_crs needs to know what its coordinates are in: say with [input] missing_crs what the \
-             files without a CRS are in, such as \"EPSG:4326\" for longitude and latitude of WGS 84, or with [input] crs what all files \
-             are in",
+            "{}: it names no CRS{}, and [input] to_crs needs one; fix: [input] missing_crs for the files without a CRS, such as \
+             \"EPSG:4326\" for longitude and latitude of WGS 84, or [input] crs for all files",
             source.path.display(),
             found_in(source)
         )));

@@ -28,7 +28,7 @@ pub(crate) fn warn_of_overruled(sources: &[Source], said: &[Crs], options: &Inpu
     let others: Vec<_> = all().filter(|pair| !differences(*pair).is_empty()).collect();
     if let Some((first, crs)) = others.first() {
         warnings.push(format!(
-            "{}[input] crs ({}) overrides its CRS: {} differs in {}",
+            "{}[input] crs ({}) overrides its CRS: {} differs in {}; fix: leave [input] crs out, if the file is right",
             of_inputs(others.len(), sources.len(), &first.path),
             crs.label(),
             if first.crs.is_named() { first.crs.label() } else { "it".to_string() },

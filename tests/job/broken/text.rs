@@ -64,15 +64,11 @@ pub(super) fn cases() -> Vec<Case> {
         ),
         ("PTX after a blank line", b"\n10\n20\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n".to_vec(), Refused(3, "is PTX")),
         ("not a number", rows_and("nan,1,2\n"), Refused(3, "line 6: column 1 (x) is \"nan\"")),
-        (
-            "fewer points than the first line promises",
-            [b"7\n", ROWS.as_bytes()].concat(),
-            Refused(3, "2 of them are not there"),
-        ),
+        ("fewer points than the first line promises", [b"7\n", ROWS.as_bytes()].concat(), Refused(3, "2 are missing")),
         (
             "fewer points than the first line promises, and names",
             [b"7\nx y z\n", ROWS.as_bytes()].concat(),
-            Refused(3, "2 of them are not there"),
+            Refused(3, "2 are missing"),
         ),
         (
             "more points than the first line promises",

@@ -68,7 +68,7 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warn
         said.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
     if let Some((first, differences)) = overruled.first() {
         warnings.push(format!(
-            "{}[input] crs ({}) overrides its CRS: {} differs in {}",
+            "{}[input] crs ({}) overrides its CRS: {} differs in {}; fix: leave [input] crs out, if the file is right",
             of_inputs(overruled.len(), sources.len(), &first.source.path),
             if crs.is_named() { crs.label() } else { format!("a plane in {}", crs.horizontal.name()) },
             if first.crs.is_named() { first.crs.label() } else { "it".to_string() },

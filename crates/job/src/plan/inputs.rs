@@ -37,7 +37,7 @@ pub fn named_inputs(options: &InputOptions) -> Result<NamedInputs> {
     for entry in &options.files {
         let entry_has = files_of_entry(entry, options)?;
         if entry_has.clouds.is_empty() {
-            return Err(Error::Config(format!("{FILES}: there is no file {entry}{}", hint_of_escape(entry))));
+            return Err(Error::Config(format!("{FILES}: there is no file {entry}{}", what_to_do_about(entry))));
         }
         notes.extend(entry_has.notes);
         for path in entry_has.clouds {
@@ -139,11 +139,11 @@ fn files_of_entry(entry: &str, options: &InputOptions) -> Result<FolderClouds> {
     Ok(found)
 }
 
-/// Returns what to do if a path has a character that TOML has made of a backslash and a letter, as of `"C:\temp"`.
-fn hint_of_escape(entry: &str) -> &'static str {
+/// Returns what to do about a path that leads nowhere. TOML makes one character of a backslash and a letter, as of `"C:\temp"`.
+fn what_to_do_about(entry: &str) -> &'static str {
     match entry.contains(['\t', '\n', '\r', '\u{8}', '\u{c}', '\u{1b}']) {
-        true => ": a backslash has a meaning of its own in double quotes; write slashes, or single quotes",
-        false => "",
+        true => ": a backslash has a meaning of its own in double quotes; fix: write slashes, or single quotes",
+        false => "; fix: correct the path, which is relative to the configuration",
     }
 }
 
@@ -202,16 +202,15 @@ pub fn check_missing_records(sources: &[Source], options: &InputOptions) -> Resu
 fn missing_records(Source { records, missing, format, .. }: &Source) -> String {
     let start = format!("says that it holds {records} records, but");
     if missing < records {
+        let are = if *missing == 1 { "is" } else { "are" };
         return format!(
-            "{start} {missing} of them are not there: the file is cut off or its header is wrong. Copy it again, or raise [input] \
+            "{start} {missing} {are} missing: the file is cut off or its header is wrong; fix: copy it again, or raise [input] \
              max_malformed_fraction to use what is there"
         );
     }
     let why = match format {
-        FileFormat::Laz => {
-            "the file is cut off before the end of its first compressed chunk, which cannot be read in part"
-        }
+        FileFormat::Laz => "the file is cut off within its first compressed chunk",
         _ => "the file is cut off after its header, or its header is wrong",
     };
-    format!("{start} none of them is there: {why}. Copy it again, or leave it out with [input] on_bad_file = \"skip\"")
+    format!("{start} all are missing: {why}; fix: copy it again, or leave it out with [input] on_bad_file = \"skip\"")
 }

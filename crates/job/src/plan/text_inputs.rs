@@ -51,9 +51,9 @@ pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Resu
     let is_open = is_silent || is_map && options.unit == UnitChoice::Auto;
     match sources.iter().find(is_in_degrees) {
         Some(source) if is_open => Err(Error::Config(format!(
-            "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), {}: [input] to_crs = \"utm\" with missing_crs = \
-             \"EPSG:4326\", if that is what they are in, transforms them to a projected CRS; if they are no degrees, set [input] crs = \
-             \"none\", and unit, for example to \"metre\"",
+            "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), {}; fix: [input] to_crs = \"utm\" with \
+             missing_crs = \"EPSG:4326\" for longitude and latitude of WGS 84; [input] crs = \"none\" and unit, such as \"metre\", if \
+             they are not degrees",
             source.path.display(),
             source.min[0],
             source.max[0],
