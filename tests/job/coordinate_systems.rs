@@ -111,7 +111,7 @@ fn the_cure_of_a_geocentric_system_is_one_that_helps() {
     }
     // The user states a CRS already, or the other file does.
     let full = "the record is ignored";
-    let short = "its record of a geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored: [input] states";
+    let short = "its geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored, because [input] names another";
     for (files, line, words) in [
         (vec![&false_record], "crs = \"EPSG:26915\"", [short, full]),
         (vec![&false_record, &bare], "missing_crs = \"EPSG:26915\"", [short, full]),
@@ -237,7 +237,7 @@ fn a_file_without_a_crs_beside_others_is_named() {
     for files in [[&bare, &coded], [&coded, &bare]] {
         let report = Job::on(&files).report();
         let said = warnings(&report);
-        assert!(said.contains("1 of 2 inputs name no CRS") && said.contains("bare.las"), "{said}");
+        assert!(said.contains("1 of 2 inputs have no CRS") && said.contains("bare.las"), "{said}");
         assert_eq!(report["crs"], "NAD83 / UTM zone 15N");
     }
     assert!(!warnings(&Job::on(&[&bare]).report()).contains("name no CRS"));
@@ -496,7 +496,7 @@ fn a_file_without_a_system_whose_coordinates_look_like_degrees_is_named() {
             write(&mut bytes, 187 + 16 * axis, place - half);
         }
         fs::write(&file, bytes).unwrap();
-        let words = "look like longitude and latitude, and are taken as lengths";
+        let words = "look like longitude and latitude, but are taken as lengths";
         let job = |line: &str| Job::on(&[&file]).with("input", line);
         assert!(warnings(&job("").report()).contains(words), "{name}");
         assert!(!warnings(&job("crs = \"none\"").report()).contains(words), "{name}");

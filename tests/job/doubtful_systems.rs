@@ -132,7 +132,7 @@ fn depths_are_told_from_heights_and_said_to_be_depths() {
         let said = warnings(&said);
         assert!(said.contains("1 of 2 inputs, such as") && said.contains("its z is a depth (Local)"), "{said}");
         let words = "1 of 2 inputs do not state whether z is a height or a depth, such as";
-        assert!(said.contains(words) && said.contains("silent.las: it is taken to count as"), "{choice}: {said}");
+        assert!(said.contains(words) && said.contains("silent.las: a depth assumed, as"), "{choice}: {said}");
     }
     let info = gdt_batch(folder.path(), &["info", "down.las"]);
     assert!(info.out.contains("its z is a depth (Local)"), "{info:?}");
@@ -157,7 +157,7 @@ fn a_projected_system_over_degrees_is_a_warning() {
     let [far, near] = ["far.las", "near.las"].map(|name| write(folder.path(), name, &[code(25832)]));
     move_to_degrees(&far);
     // Its area of use does not reach to the equator.
-    Job::on(&[&far]).run().refused(3, &["far.las", "As longitude and latitude, they lie within it: [input] crs"]);
+    Job::on(&[&far]).run().refused(3, &["far.las", "as longitude and latitude, they lie within it: [input] crs"]);
     let said = Job::on(&[&far]).with("input", "outside_crs_area = \"warn\"").run_with(&["check"]);
     let said = format!("{}{}", said.out, said.err);
     assert!(said.contains("far.las") && said.contains("look like longitude and latitude"), "{said}");

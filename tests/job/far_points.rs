@@ -186,7 +186,7 @@ fn one_bad_file_of_several_is_left_out() {
 #[test]
 fn a_few_points_that_stretch_the_area_are_told_with_the_bounds_of_the_others() {
     let far: Vec<[i32; 3]> = (0..4).map(|i| [200_000 + 50_000 * i, 300_000, 100]).collect();
-    let hint = " stretch the area to 3500 x 3000: to leave them out, set [input] bounds = [";
+    let hint = " stretch the area to 3500 x 3000; fix: [input] bounds = [";
     for header in [Header::All, Header::Near, Header::Zeros] {
         let cloud = Far::of(near(6000, 8000), &far, 5000, header, 2);
         let report = cloud.job().report();

@@ -139,7 +139,7 @@ fn a_cloud_without_ground_is_refused_with_what_it_has_and_what_to_do() {
     let words = [
         "no point is left",
         "class 1 (unclassified, 75 %), class 5 (high vegetation, 25 %)",
-        "set surface = \"bare-earth\" to let the program find the ground",
+        "[input] surface = \"bare-earth\" finds the ground",
     ];
     for file in [&las, &csv] {
         let job = Job::on(&[file]).with("input", "surface = \"ground\"");
@@ -153,11 +153,11 @@ fn a_cloud_without_ground_is_refused_with_what_it_has_and_what_to_do() {
     fs::write(&good, cloud(class).las()).unwrap();
     let mixed = Job::on(&[&las, &good]).with("input", "surface = \"ground\"");
     let check = mixed.run_with(&["check"]).succeeded().out;
-    assert!(check.contains("a.las: no point is left of it: surface"), "{check}");
+    assert!(check.contains("a.las: no point of it is used: surface"), "{check}");
     let report = mixed.report();
     let warnings = report["warnings"].to_string();
     assert!(
-        warnings.contains("a.las: no point is left of it: surface") && !warnings.contains("good.las: no"),
+        warnings.contains("a.las: no point of it is used: surface") && !warnings.contains("good.las: no"),
         "{warnings}"
     );
 }

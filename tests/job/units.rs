@@ -71,7 +71,7 @@ fn a_crs_of_the_user_takes_no_unit_of_heights_away() {
     for (file, metre) in [(&feet, 0.3048), (&las, US_FOOT)] {
         let (found, said) = metres(&[file], "crs = \"EPSG:26915\"");
         assert_eq!(found, [1.0, metre]);
-        assert!(said.contains("[input] crs (NAD83 / UTM zone 15N (EPSG:26915)) says no unit of heights"), "{said}");
+        assert!(said.contains("[input] crs (NAD83 / UTM zone 15N (EPSG:26915)) has no unit of heights"), "{said}");
         assert_eq!(metres(&[file], "crs = \"EPSG:26915+5703\"").0, [1.0, 1.0]);
     }
     let both = Job::on(&[&feet, &las]).with("input", "crs = \"EPSG:26915\"").run();

@@ -87,11 +87,11 @@ mod tests {
         let ground = options("surface = \"ground\"");
         let what = no_ground(&ground, &counts(&[(1, 95), (5, 4), (70, 1)], 0)).unwrap();
         assert!(
-            what.contains("have class 1 (unclassified, 95 %), class 5 (high vegetation, 4 %), class 70 (1 %): set surface = \"bare-earth\""),
+            what.contains("have class 1 (unclassified, 95 %), class 5 (high vegetation, 4 %), class 70 (1 %); fix: [input] surface = \"bare-earth\""),
             "{what}"
         );
         let many: Vec<(u8, u64)> = (30..60).map(|class| (class, 1)).collect();
-        assert!(no_ground(&ground, &counts(&many, 0)).unwrap().contains("class 37 (3 %), 22 more: set"));
+        assert!(no_ground(&ground, &counts(&many, 0)).unwrap().contains("class 37 (3 %), 22 more; fix"));
         assert_eq!(no_ground(&ground, &counts(&[(1, 95), (20, 1)], 0)), None);
         assert_eq!(no_ground(&ground, &counts(&[], 0)), None);
         assert_eq!(no_ground(&options(""), &counts(&[(1, 95)], 0)), None);
@@ -102,10 +102,7 @@ mod tests {
         let counts = counts(&[(1, 150), (2, 50)], 50);
         assert_eq!(unclear_returns(&options("surface = \"ground\""), &counts), None);
         for (text, words) in [
-            (
-                "surface = \"first\"",
-                "25 % of the points (50 of 200) do not say clearly which return of how many they are: one without",
-            ),
+            ("surface = \"first\"", "25 % of the points (50 of 200) have no valid return number: they are"),
             ("returns = \"last\"", "last returns if"),
             ("returns = [2]", "number 1"),
         ] {

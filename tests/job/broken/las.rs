@@ -77,7 +77,12 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
             ("EVLRs in the points", 235, [&400u64.to_le_bytes()[..], &[1, 0, 0, 0]].concat(), Refused(3, "there: ")),
             ("64-bit count", 247, vec![0xff; 8], Refused(3, "18446744073709551615 points")),
             ("64-bit count of 2^40", 247, (1u64 << 40).to_le_bytes().to_vec(), Refused(2, "2^40")),
-            ("64-bit count too large", 247, 201u64.to_le_bytes().to_vec(), Refused(3, "holds 201 records, but 1 of")),
+            (
+                "64-bit count too large",
+                247,
+                201u64.to_le_bytes().to_vec(),
+                Refused(3, "holds 201 records, but 1 is missing"),
+            ),
             ("64-bit count too small", 247, 150u64.to_le_bytes().to_vec(), Read(150, 0, "")),
             ("two counts", 107, vec![0xff; 4], Read(COUNT, 0, "two point counts")),
             ("no count", 247, vec![0; 8], Refused(3, "no point is left")),
@@ -86,7 +91,7 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
     } else {
         fields.extend([
             ("count", 107, vec![0xff; 4], Refused(3, "holds 4294967295 records")),
-            ("count too large", 107, 201u32.to_le_bytes().to_vec(), Refused(3, "holds 201 records, but 1 of")),
+            ("count too large", 107, 201u32.to_le_bytes().to_vec(), Refused(3, "holds 201 records, but 1 is missing")),
             ("count too small", 107, 150u32.to_le_bytes().to_vec(), Read(150, 0, "")),
             ("no count", 107, vec![0; 4], Refused(3, "no point is left")),
         ]);

@@ -199,8 +199,8 @@ mod tests {
         assert!(!Hint::Few.is_worth_it(&benchmark));
         assert_eq!(
             sentence(&found(12, 5000.0), Some(" (the first is point 7 of a.las)".into()), false).unwrap(),
-            "99.98 % of the points lie within 80 x 70 units; 12 points (the first is point 7 of a.las) stretch the area to 5000 x 70: to leave them out, set [input] \
-             bounds = [0.0, 0.0, 80.0, 70.0]"
+            "99.98 % of the points lie within 80 x 70 units; 12 points (the first is point 7 of a.las) stretch the area to 5000 x 70; fix: [input] bounds = \
+             [0.0, 0.0, 80.0, 70.0] leaves them out"
         );
     }
 }

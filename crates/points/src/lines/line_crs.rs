@@ -281,7 +281,7 @@ mod tests {
             file.warnings.iter().map(|warning| warning.to_string()).collect::<Vec<_>>().concat()
         };
         let alike = lines(&wgs84, DatumRule::Close);
-        assert!(alike.contains("takes WGS 84 and NAD83 for one datum"), "{alike}");
+        assert!(alike.contains("no datum shift between WGS 84 and NAD83"), "{alike}");
         let nameless = system(
             &zone_15
                 .wkt
@@ -346,7 +346,7 @@ mod tests {
             (&feet, auto, &plane, 10.0 * FOOT, "from US survey foot to metre, the unit of x and y"),
             (&feet, auto, &metres, 10.0 * FOOT, "from US survey foot to metre, the unit of the points' heights"),
             (&metres, auto, &feet, 10.0 / FOOT, "from metre to US survey foot"),
-            (&plane, auto, &feet, 10.0, "it is taken to be US survey foot"),
+            (&plane, auto, &feet, 10.0, "US survey foot assumed"),
             (&plane, auto, &metres, 10.0, ""),
             (&feet, auto, &feet, 10.0, ""),
             (&plane, "height_unit = \"foot\"", &plane, 3.048, "from foot to metre"),
