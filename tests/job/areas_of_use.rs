@@ -71,7 +71,7 @@ fn coordinates_of_another_country_and_of_a_plane_are_refused_with_their_cures() 
         ("degrees.csv", [9.0, 50.0], 25832, "crs = \"EPSG:4326\""),
         // Krovak's projection has another form than all others.
         ("south.csv", [700_000.0, 1_050_000.0], 5514, "S-JTSK"),
-        ("feet.csv", [1_640_419.0, 18_044_619.0], 25832, "In the unit foot, they lie within it"),
+        ("feet.csv", [1_640_419.0, 18_044_619.0], 25832, "in the unit foot, they lie within it"),
         ("nowhere.csv", [30_000_000.0, 5_500_000.0], 25832, "are no place on earth"),
     ] {
         let file = csv(&folder, name, place, if name == "degrees.csv" { 1e-4 } else { 7.0 });
@@ -157,7 +157,7 @@ fn what_is_transformed_is_judged_by_both_systems() {
     }
     let table = csv(&folder, "table.csv", PLACE, 7.0);
     let far = "crs = \"EPSG:25832\"\nto_crs = \"EPSG:32615\"\ndatums = \"close\"";
-    Job::on(&[&table]).with("input", far).run().refused(3, &["WGS 84 / UTM zone 15N", "with [input] to_crs"]);
+    Job::on(&[&table]).with("input", far).run().refused(3, &["WGS 84 / UTM zone 15N", "[input] to_crs = "]);
 }
 
 /// The text of a map without a name, a code or a datum.
@@ -202,16 +202,16 @@ fn a_projection_without_name_code_and_datum_has_the_area_that_it_is_good_for() {
 fn the_mistake_that_explains_the_place_is_named() {
     let folder = tempfile::tempdir().unwrap();
     for (name, place, step, crs, word) in [
-        ("prefix.csv", [32_500_000.0, 5_500_000.0], 7.0, 25832, "With 32000000 subtracted from x"),
-        ("no_prefix.csv", [500_000.0, 5_400_000.0], 7.0, 31467, "With 3000000 added to x"),
+        ("prefix.csv", [32_500_000.0, 5_500_000.0], 7.0, 25832, "with 32000000 subtracted from x"),
+        ("no_prefix.csv", [500_000.0, 5_400_000.0], 7.0, 31467, "with 3000000 added to x"),
         (
             "lv95.csv",
             [2_600_000.0, 1_200_000.0],
             7.0,
             21781,
-            "With 2000000 subtracted from x and 1000000 subtracted from y",
+            "with 2000000 subtracted from x and 1000000 subtracted from y",
         ),
-        ("south.csv", [333_000.0, -3_740_000.0], 7.0, 7856, "With 10000000 added to y"),
+        ("south.csv", [333_000.0, -3_740_000.0], 7.0, 7856, "with 10000000 added to y"),
         (
             "south_of_north.csv",
             [330_148.0, 7_395_154.0],
@@ -220,7 +220,7 @@ fn the_mistake_that_explains_the_place_is_named() {
             "set [input] crs = \"EPSG:31982\" (SIRGAS 2000 / UTM zone 22S)",
         ),
         ("krovak.csv", [744_000.0, 1_041_000.0], 7.0, 5514, "with the sign of x and y changed"),
-        ("km.csv", [500.0, 5_500.0], 0.007, 25832, "In the unit kilometre"),
+        ("km.csv", [500.0, 5_500.0], 0.007, 25832, "in the unit kilometre"),
         ("degrees.csv", [2.35, 48.85], 1e-4, 2154, "as longitude and latitude, they lie within it"),
         ("latitude.csv", [48.85, 2.35], 1e-4, 2154, "Latitude comes first: [input.csv] columns"),
     ] {
@@ -362,7 +362,7 @@ fn metres_under_a_map_in_feet_are_named_some_kilometres_outside_its_area() {
         let file = csv(&folder, name, place, 7.0);
         let said = warnings(&Job::on(&[&file]).with("input", &format!("crs = \"EPSG:{crs}\"")).report());
         match unit {
-            Some(unit) => assert!(said.contains(&format!("In the unit {unit}, they lie within it")), "{name} {said}"),
+            Some(unit) => assert!(said.contains(&format!("in the unit {unit}, they lie within it")), "{name} {said}"),
             None => assert!(!said.contains("area of use"), "{name} {said}"),
         }
     }

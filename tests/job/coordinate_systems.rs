@@ -288,7 +288,7 @@ fn a_file_of_unknown_datum_does_not_let_two_datums_pass() {
         let report = Job::on(&files).report();
         let said = warnings(&report);
         assert!(said.contains("1 of 2 inputs have no datum, such as") && said.contains("unknown.las"), "{said}");
-        assert!(said.contains("taken to be GCS_North_American_1983"), "{said}");
+        assert!(said.contains("GCS_North_American_1983 assumed"), "{said}");
         assert_eq!(report["crs"], "UTM_15N");
     }
     assert!(!warnings(&Job::on(&[&unknown]).report()).contains("have no datum"));
@@ -348,7 +348,7 @@ fn degrees_in_the_hundred_thousands_are_a_plane_in_metres() {
     let job = Job::on(&[&scan]);
     let report = job.report();
     let said = warnings(&report);
-    assert!(said.contains("scan.las") && said.contains("WGS 84") && said.contains("no longitude"), "{said}");
+    assert!(said.contains("scan.las") && said.contains("WGS 84") && said.contains("in degrees, but x"), "{said}");
     assert_eq!((report["unit"].as_str(), report["crs"].as_str()), (Some("metre"), None));
     job.verified();
     let given = Job::on(&[&scan]).with("input", "crs = \"EPSG:26915\"").report();

@@ -103,7 +103,7 @@ fn the_row_that_makes_the_lattice_coarse_is_named() {
     let apart = Texts::new(&[plain(300), rows(200, 5, " ", ".").replace("565", "4565")]);
     let said = warnings(&apart.job().report());
     assert!(said.contains("rounded to") && !said.contains("the row farthest"), "{said}");
-    assert!(said.contains("the file farthest from the others is") && said.contains("1.txt (x from 4565"), "{said}");
+    assert!(said.contains("the file farthest from the others is") && said.contains("1.txt (x 4565"), "{said}");
 }
 
 #[test]

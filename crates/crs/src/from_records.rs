@@ -50,9 +50,8 @@ fn from_texts(texts: impl Iterator<Item = Result<Vec<u8>>>, warnings: &mut Warni
         match from_wkt::parse(&text) {
             Some(crs) => return Ok(Some(crs)),
             None if text.trim_matches(['\0', ' ', '"', '\'']).is_empty() => {}
-            None => warnings.push(
-                "its coordinate system is WKT that cannot be read, and is ignored; fix: [input] crs = \"EPSG:...\"",
-            ),
+            None => warnings
+                .push("its coordinate system is not well-known text that can be read; fix: [input] crs = \"EPSG:...\""),
         }
     }
     Ok(None)

@@ -12,11 +12,22 @@ const FIX: &str = "; fix: ";
 #[derive(Clone, Copy, Debug)]
 pub struct ShownWarning<'a>(pub &'a str);
 
+impl<'a> ShownWarning<'a> {
+    /// Returns what it is, without the remedy.
+    pub fn what(self) -> &'a str {
+        self.parts().0
+    }
+
+    fn parts(self) -> (&'a str, Option<&'a str>) {
+        self.0.rsplit_once(FIX).map_or((self.0, None), |(what, fix)| (what, Some(fix)))
+    }
+}
+
 impl fmt::Display for ShownWarning<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0.rsplit_once(FIX) {
-            Some((what, fix)) => write!(f, "warning: {}\n  fix: {}", one_line(what), one_line(fix)),
-            None => write!(f, "warning: {}", one_line(self.0)),
+        match self.parts() {
+            (what, Some(fix)) => write!(f, "warning: {}\n  fix: {}", one_line(what), one_line(fix)),
+            (what, None) => write!(f, "warning: {}", one_line(what)),
         }
     }
 }

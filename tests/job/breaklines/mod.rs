@@ -82,7 +82,7 @@ fn what_is_wrong_with_heights_is_said() {
         "by 0.5 at (500110, 4000010)",
         "1 lake is not flat",
         "0.3 higher at (500040, 4000080)",
-        "heights disagree at 1 places",
+        "heights disagree at 1 place where",
     ] {
         assert!(said.out.contains(words), "no {words:?} in {}", said.out);
     }

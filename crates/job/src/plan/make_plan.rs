@@ -342,7 +342,7 @@ fn files_without_ground(sample: &HeightSample, options: &JobOptions) -> Option<S
         0 => String::new(),
         count => format!(" (and so for {count} other files)"),
     };
-    Some(format!("{}: no point is left of it{others}: {what}", path.display()))
+    Some(format!("{}: no point of it is used{others}: {what}", path.display()))
 }
 
 /// Returns the least and the greatest height that the sources claim, in steps of the lattice.
