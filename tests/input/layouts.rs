@@ -374,7 +374,11 @@ fn colours_and_classes_that_cannot_be_read_lose_no_point() {
         assert_eq!(cloud.points[0].rgb, [1, 2, 0], "{color}");
         assert!(first_warning(&cloud).contains("they are read as 0"), "{}", first_warning(&cloud));
         let cloud = assert_two_points(&format!("x,y,z,r,g,b\n1.5,2,3.25,1,2,{color}\n4,5,6,4,{color},6\n"));
-        assert!(!cloud.source.has_rgb && first_warning(&cloud).contains("left out"), "{}", first_warning(&cloud));
+        assert!(
+            !cloud.source.has_rgb && first_warning(&cloud).contains("and are ignored"),
+            "{}",
+            first_warning(&cloud)
+        );
     }
 }
 

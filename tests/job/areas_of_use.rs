@@ -217,7 +217,7 @@ fn the_mistake_that_explains_the_place_is_named() {
             [330_148.0, 7_395_154.0],
             7.0,
             31976,
-            "set [input] crs = \"EPSG:31982\" (SIRGAS 2000 / UTM zone 22S)",
+            "[input] crs = \"EPSG:31982\" (SIRGAS 2000 / UTM zone 22S)",
         ),
         ("krovak.csv", [744_000.0, 1_041_000.0], 7.0, 5514, "with the sign of x and y changed"),
         ("km.csv", [500.0, 5_500.0], 0.007, 25832, "in the unit kilometre"),
