@@ -111,7 +111,7 @@ mod tests {
         let shared = [3, 8, -10_099];
         let two = warning(&[&[[4, 1, -10_099], shared], &[shared, [0, 0, 5]], &[[1, 1, 7]]]);
         assert!(two.contains("in 2 cells") && two.contains("points at (101.5, 104), (102, 100.5) have it"), "{two}");
-        assert!(two.contains("[input] nodata = -9999;"), "{two}");
+        assert!(two.contains("[input] nodata = -9999 if"), "{two}");
         let many: Vec<[i32; 3]> = (0..9).map(|n| [8 - n, n, -10_099]).collect();
         let said = warning(&[&many]);
         assert!(said.contains("points at (100, 104), (100.5, 103.5), (101, 103) and other places have it"), "{said}");
