@@ -253,7 +253,7 @@ mod tests {
         assert!(bring(&zone_15, "auto", &zone_15).unwrap().is_empty());
         assert!(bring(&Crs::default(), "auto", &Crs::default()).unwrap().is_empty());
         let taken = bring(&Crs::default(), "auto", &zone_15).unwrap();
-        assert!(taken.iter().any(|warning| warning.contains("says no CRS")));
+        assert!(taken.iter().any(|warning| warning.contains("has no CRS")));
         let without = bring(&zone_15, "auto", &Crs::default()).unwrap();
         assert!(without.iter().any(|warning| warning.contains("the points have no CRS")));
         for points in [&zone_15, &Crs::default()] {
