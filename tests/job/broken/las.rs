@@ -74,7 +74,7 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
     if minor >= 4 {
         fields.extend([
             ("EVLRs beyond", 235, vec![0xff; 12], Read(COUNT, 0, "4294967295 extended variable length records")),
-            ("EVLRs in the points", 235, [&400u64.to_le_bytes()[..], &[1, 0, 0, 0]].concat(), Refused(3, "there: ")),
+            ("EVLRs in the points", 235, [&400u64.to_le_bytes()[..], &[1, 0, 0, 0]].concat(), Refused(3, "missing: ")),
             ("64-bit count", 247, vec![0xff; 8], Refused(3, "18446744073709551615 points")),
             ("64-bit count of 2^40", 247, (1u64 << 40).to_le_bytes().to_vec(), Refused(2, "2^40")),
             (
@@ -180,7 +180,7 @@ pub(super) fn records_and_cuts() -> Vec<Case> {
         let cut = 227 + (plain.len() - 227) * eighth / 8 - 1;
         let missing = COUNT - ((cut - 227) / length) as u64;
         let name = format!("cut after {eighth} of 8");
-        cases.push(case(&name, ".las", plain[..cut].to_vec(), Refused(3, "there: ")));
+        cases.push(case(&name, ".las", plain[..cut].to_vec(), Refused(3, "missing: ")));
         cases.push(
             case(&name, ".las", plain[..cut].to_vec(), Read(COUNT, missing, "missing"))
                 .with("max_malformed_fraction = 1.0"),
