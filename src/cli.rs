@@ -17,19 +17,19 @@ Examples:
   gdt-batch tiles/ --surface ground     make bare earth of all point clouds in a folder, in tiles-terrain
   gdt-batch init *.laz                  write job.toml, a configuration for these clouds
   gdt-batch job.toml                    run the job of a configuration
-  gdt-batch check job.toml              what would the job read, how large is it, does it fit?
-  gdt-batch info --histogram a.laz      what does a cloud hold, class by class?
+  gdt-batch check job.toml              show what the job would do, and whether it fits
+  gdt-batch info --histogram a.laz      count the points of each class
   gdt-batch view out                    look at the terrain in a browser
   gdt-batch verify out                  prove that the tiles in out are the exact Delaunay triangulation
   gdt-batch verify out --input *.laz    and that its vertices are the points of these files
-  gdt-batch diff before after           how much was cut and filled between two terrains?
+  gdt-batch diff before after           compute cut and fill between two terrains
 
 The shortest configuration:
   [input]
   files = [\"clouds/*.laz\"]
   [output]
   directory = \"out\"
-`gdt-batch init` writes one with more options in it; the manual explains all in options.md.
+`gdt-batch init` writes one with more options; the manual explains all in options.md.
 
 After an interruption, run the same command again: the job continues where it stopped.
 
@@ -37,7 +37,7 @@ Exit codes:
   0  done
   1  may be retried (disk, memory, Ctrl-C)
   2  command line or configuration
-  3  bad input; for verify: nothing is wrong, but not everything can be proved
+  3  bad input; for verify: no error found, but a file that the proof needs is missing
   4  a guarantee does not hold (verify failed, or an internal check)";
 
 /// What `--version` shows: also the commit, if it is known, and the features that are built in. build.rs makes it.
@@ -99,13 +99,13 @@ pub struct PrintOptions {
     /// Print only errors and essential notices.
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Print all figures of a job: each stage, what became of all points, how tiles were triangulated.
+    /// Print all figures of a job: stages, points, triangulation.
     #[arg(long, short, global = true)]
     pub verbose: bool,
     /// Print the result as JSON on standard output.
     #[arg(long, global = true)]
     pub json: bool,
-    /// How to show progress on standard error: json prints a line a second for programs; auto suits a terminal or a log.
+    /// How to show progress on standard error: json prints a line a second for programs.
     #[arg(long, global = true, value_name = "HOW", default_value = "auto")]
     pub progress: ShownProgress,
 }
@@ -113,7 +113,7 @@ pub struct PrintOptions {
 /// The commands other than running a job.
 #[derive(Subcommand, Debug)]
 pub enum CliCommand {
-    /// Write a configuration for point clouds: what they hold, what a job needs to read them, and what may be changed.
+    /// Write a configuration for point clouds, with comments on what they contain.
     ///
     /// Reads headers and a sample of the points, and all of a text. Sets what the job needs, such as to_crs for degrees, and says why in
     /// a comment. If no configuration makes a job of the clouds, the message and the exit code are those of `check`.
@@ -123,7 +123,7 @@ pub enum CliCommand {
         /// The configuration to write; - for standard output.
         #[arg(long, short, value_name = "FILE", default_value = "job.toml")]
         output: PathBuf,
-        /// Replace the configuration if it is there. Any other file stays.
+        /// Overwrite an existing configuration, never another file.
         #[arg(long)]
         force: bool,
     },
@@ -134,8 +134,8 @@ pub enum CliCommand {
     },
     /// Read the results back and prove with exact arithmetic that the tiles are the Delaunay triangulation.
     ///
-    /// Also compares every file with the checksums that the job has left. Exit code 0: proved. 3: nothing is wrong, but something that
-    /// the proof needs is missing. 4: something is wrong.
+    /// Also compares every file with its checksum. Exit code 0: proved. 3: no error found, but a file that the proof needs is missing.
+    /// 4: something is wrong.
     Verify {
         /// The output directory of a job.
         #[arg(value_hint = ValueHint::DirPath)]
@@ -143,7 +143,7 @@ pub enum CliCommand {
         /// The memory that verify may use, such as "4 GiB".
         #[arg(long, default_value = "4 GiB", value_parser = memory)]
         memory: u64,
-        /// The files that the job has read: prove that the vertices are their points, heights included.
+        /// The inputs of the job: prove that the vertices are their points, heights included.
         #[arg(long, num_args = 1.., value_name = "FILE")]
         input: Vec<PathBuf>,
     },
@@ -156,37 +156,37 @@ pub enum CliCommand {
     /// Write the heights of a terrain along lines as CSV.
     ///
     /// A row for each vertex of a line and each edge of the mesh that it crosses: line, distance, x, y, z, in units of the terrain. Outside of
-    /// the terrain z is empty, and so it is in a second row of the place where a line leaves the terrain.
+    /// the terrain z is empty. Where a line leaves the terrain there are two rows, the second without z.
     Profile {
         /// The terrain: the output directory of a finished job, or its configuration.
         #[arg(value_hint = ValueHint::AnyPath)]
         terrain: PathBuf,
-        /// The lines: GeoJSON, GeoPackage or Shapefile, in the CRS of the terrain or in one that leads to it.
+        /// The lines: GeoJSON, GeoPackage or Shapefile, in the CRS of the terrain or in one that can be transformed into it.
         #[arg(value_hint = ValueHint::FilePath)]
         lines: PathBuf,
-        /// The file to write, replaced if it is there. Default: standard output.
+        /// The file to write; an existing CSV is overwritten. Default: standard output.
         #[arg(long, short, value_name = "FILE")]
         output: Option<PathBuf>,
     },
-    /// Show the results in a browser: serve them, and open a page with the terrain.
+    /// Show the terrain in a browser.
     ///
-    /// Only browsers on this machine can reach the page, unless --address says otherwise. Ctrl-C ends it.
+    /// Serves the results, and opens a page. Only browsers on this machine can reach it, unless --address is set. Ctrl-C ends it.
     View(ViewOptions),
-    /// Do one task of one phase of a large job, as schedulers of clusters start it.
+    /// Run one task of a distributed job (called by the scheduler).
     ///
-    /// All tasks of all phases, on any machines that share the output directory, do the job together. The results have the same bytes
-    /// however many tasks there are. Exit code 1: the task may be tried again; if an earlier phase is not complete, the message names
-    /// its tasks that are missing.
+    /// The tasks of all phases, on machines that share the output directory, do the job together. The results have the same bytes for any
+    /// number of tasks. Exit code 1: the task may be tried again; if an earlier phase is not complete, the message names its missing
+    /// tasks.
     Work {
         /// The configuration of the job.
         config: PathBuf,
         /// The phase to work on.
         #[arg(long, value_enum)]
         phase: Phase,
-        /// The task: number i, from 1 on, of N. Default: what the environment of an array job says (Slurm, Kubernetes, AWS Batch).
+        /// The task: number i, from 1 on, of N. Default: from the environment of an array job (Slurm, Kubernetes, AWS Batch).
         #[arg(long, value_name = "i/N")]
         task: Option<Task>,
-        /// The number of tasks that phases are dealt out to, where the environment tells only the number of this one.
+        /// The number of tasks of each phase, where the environment has only the number of this one.
         #[arg(long, value_name = "N", conflicts_with = "task", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: Option<u32>,
         /// Worker threads of this task, instead of `[limits] threads`.
@@ -195,41 +195,41 @@ pub enum CliCommand {
         /// Plan the job even if it does not seem to fit the disk or the memory of this machine.
         #[arg(long)]
         force: bool,
-        /// The number of a submission that starts the job over, as `submit --restart` gives it: what was done before does not count.
+        /// The number of a submission that starts the job over, as `submit --restart` gives it.
         #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
         submission: u64,
         /// Stop when standard input ends. The engine `local` holds its other end, so no task outlives the engine.
         #[arg(long, hide = true)]
         until_stdin_ends: bool,
     },
-    /// Send a large job to an engine that does its tasks.
+    /// Run a large job on many machines.
     ///
-    /// All machines must see the inputs, the configuration and the output directory under the same paths. If the job is under way, only
-    /// the tasks that are missing are sent: run the same command again after failures. If the job is done, nothing is sent.
+    /// All machines must see the inputs, the configuration and the output directory under the same paths. Only missing
+    /// tasks are sent: after failures, run the same command again.
     Submit {
         /// The configuration of the job.
         config: PathBuf,
         /// The engine.
         #[arg(long, value_enum)]
         engine: Engine,
-        /// The number of tasks that each phase is dealt out to. With `local`, at most as many run at once.
+        /// The number of tasks of each phase. With `local`, at most as many run at once.
         #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: u32,
         /// Start the job over, also if it is done or under way.
         #[arg(long)]
         restart: bool,
-        /// Send nothing, and print what the engine would get.
+        /// Send nothing, and print what would be sent.
         #[arg(long)]
         dry_run: bool,
         /// Options of the engine: with slurm those of sbatch; with kubernetes see `-- --help`.
         #[arg(last = true, value_name = "ENGINE OPTIONS")]
         added: Vec<String>,
     },
-    /// Show how far a job is that tasks are doing, and what is missing.
+    /// Show the progress of a distributed job.
     Status {
         /// The configuration of the job.
         config: PathBuf,
-        /// The number of tasks that phases are dealt out to: names the tasks that are missing, rather than the parts.
+        /// The number of tasks of each phase: name missing tasks, not parts.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: Option<u32>,
     },
@@ -238,30 +238,30 @@ pub enum CliCommand {
         /// Point clouds: LAS, LAZ, COPC, EPT or text, or lists of them.
         #[arg(required = true)]
         files: Vec<PathBuf>,
-        /// Read all points too, and count those of each class and of each return.
+        /// Read all points, and count those of each class and of each return.
         #[arg(long)]
         histogram: bool,
     },
-    /// List the GPUs of this machine, test each step of the pipeline on one of them, and say how much faster it makes a job.
+    /// List the GPUs of this machine, test one, and measure how much faster a job is with it.
     Gpu {
         /// Part of the name of the GPU to test. Default: the GPU that backend = "gpu" takes.
         #[arg(long)]
         adapter: Option<String>,
-        /// The most leaves in an atlas to time; 0 times nothing.
+        /// Largest batch to benchmark; 0 skips it.
         #[arg(long)]
         leaves: Option<usize>,
     },
-    /// Write a made-up sample terrain as LAS or LAZ.
+    /// Write a sample terrain as LAS or LAZ.
     Sample {
         /// The file to write: .las or .laz.
         file: PathBuf,
         /// The number of points.
         #[arg(long, default_value_t = 1_000_000)]
         points: u64,
-        /// Each seed gives another terrain.
+        /// Different seeds make different terrains.
         #[arg(long, default_value_t = 1)]
         seed: u64,
-        /// Overwrite the file if it is there.
+        /// Overwrite an existing file.
         #[arg(long)]
         overwrite: bool,
     },
@@ -293,16 +293,16 @@ pub struct DiffOptions {
     /// Count cut and fill only where the height changes by at least this much, in units of the heights. Default: 0.
     #[arg(long, value_name = "HEIGHT", default_value_t = 0.0, hide_default_value = true, value_parser = threshold)]
     pub threshold: f64,
-    /// Polygons that get figures of their own: GeoJSON, GeoPackage or Shapefile. Their attribute "name" is shown.
+    /// Also figures for each of these polygons: GeoJSON, GeoPackage or Shapefile. Their attribute "name" is shown.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub areas: Option<PathBuf>,
     /// Also write a raster of the differences and a mesh in their colours to this folder: a new one, or that of an earlier difference.
     #[arg(long, short, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub output: Option<PathBuf>,
-    /// The side of a cell of the raster, in units of x and y. Default: about the distance of the points of the finer terrain.
+    /// Cell size of the raster, in units of x and y. Default: about the point spacing of the finer terrain.
     #[arg(long, value_name = "LENGTH", requires = "output", value_parser = length)]
     pub resolution: Option<f64>,
-    /// The change with the strongest colours, in units of the heights. Default: nearly all changes are smaller.
+    /// The change with the strongest colours, in units of the heights. Default: more than nearly all changes.
     #[arg(long, value_name = "HEIGHT", requires = "output", value_parser = length)]
     pub range: Option<f64>,
     /// The memory that diff may use, such as "4 GiB".
@@ -322,14 +322,14 @@ pub struct ViewOptions {
     /// Do not open a browser.
     #[arg(long)]
     pub no_open: bool,
-    /// The address of this machine to listen on. With 0.0.0.0, every machine that reaches this one can read the results.
+    /// The address to listen on. With 0.0.0.0, every machine that reaches this one can read the results.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     pub address: IpAddr,
-    /// A name that browsers know this machine by, if it is not its host name, such as that of a proxy. May be given several times.
+    /// Another host name that browsers may use, such as that of a proxy. May be given several times.
     #[arg(long, value_name = "NAME", value_parser = host_name)]
     pub host: Vec<String>,
-    /// Let pages of other servers read the results: a map of yours that shows terrain.pmtiles, for example. Any page in a browser that reaches
-    /// the server may then read them.
+    /// Send CORS headers, so that pages of other servers can read the results, such as your own map. Any page in a browser that reaches the
+    /// server can then read them.
     #[arg(long)]
     pub cors: bool,
 }

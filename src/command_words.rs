@@ -66,12 +66,19 @@ fn check_first_word(words: &[PathBuf], commands: &[String]) -> Result<()> {
 /// The endings of lists of point clouds, and of the description of an EPT.
 const LISTS: [&str; 3] = ["vpc", "json", "lst"];
 
+/// The endings of texts that are point clouds or meshes of other programs: a message about their format helps more than one about TOML.
+const OTHERS: [&str; 4] = ["ply", "pcd", "ptx", "obj"];
+
 /// Tells whether a word that stands alone is the configuration of a job: a file `.toml`, or any other text that is not called like a point
 /// cloud.
 fn may_be_configuration(word: &Path) -> bool {
     match word.metadata() {
         _ if is_called(word, &[TOML]) => true,
-        _ if is_called(word, &LASER) || is_called(word, &LISTS) || word.to_str().is_some_and(is_url) => false,
+        _ if [&LASER[..], &LISTS, &OTHERS].iter().any(|endings| is_called(word, endings))
+            || word.to_str().is_some_and(is_url) =>
+        {
+            false
+        }
         Ok(data) if data.is_dir() => false,
         // What is in a pipe can be read once.
         Ok(data) if !data.is_file() => true,

@@ -18,6 +18,7 @@ pub mod init;
 pub mod manual;
 pub mod sample;
 mod shell_word;
+pub mod step_progress;
 pub mod submit;
 #[cfg(feature = "viewer")]
 pub mod view;

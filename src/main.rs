@@ -10,6 +10,7 @@ use gdt_batch::command_words::{self, Named};
 use gdt_batch::error::{Error, Result};
 use gdt_batch::exit_code::{exit_code, exit_code_of_verify};
 use gdt_batch::init::{ConfigRequest, NewConfiguration, as_argument};
+use gdt_batch::step_progress::StepProgress;
 use gdt_batch::submit::local::LocalEngine;
 use gdt_batch::submit::request::Request;
 use gdt_batch::submit::{Engine, kubernetes, slurm};
@@ -21,6 +22,7 @@ use job::report::job_report::Report;
 use job::report::skipped_inputs::skipped_summary;
 use job::report::summary::Summary;
 use job::report::task_outcome::TaskOutcome;
+use points::Source;
 use points::histogram::Histogram;
 use points::info::{SourceDescription, describe};
 use serde::Serialize;
@@ -33,9 +35,9 @@ use survey::profile::{self, Profile, ProfileRequest};
 use survey::written::DifferenceOutput;
 use sys::threads;
 use sys::threads::on_threads;
-use sys::{interrupt, say, shortage, terminal};
+use sys::{ShownWarning, interrupt, say, shortage, terminal, with_remedy_below};
 use tiles::file_names::OutputFiles;
-use verify::Conclusion;
+use verify::{Conclusion, Watcher};
 
 /// A file of lines may take this many bytes of memory.
 const MEMORY_FOR_LINES: u64 = 1 << 30;
@@ -44,7 +46,7 @@ fn main() -> ExitCode {
     match shortage::listen(exit_code).map_err(Error::from).and_then(|()| run(command_line())) {
         Ok(code) => code,
         Err(error) => {
-            say(&format!("error: {error}"));
+            say(&format!("error: {}", with_remedy_below(&error.to_string())));
             ExitCode::from(error.exit_code())
         }
     }
@@ -333,7 +335,10 @@ fn check_job(path: &Path, print: PrintOptions) -> Result<ExitCode> {
 /// Verifies the output of a job. With `--quiet` too, an error says what is wrong or cannot be proved.
 fn verify_output(directory: &Path, memory: u64, inputs: &[PathBuf], print: PrintOptions) -> Result<ExitCode> {
     let inputs = &named(inputs)?;
-    let verdict = on_threads(threads::available(), || verify::verify_against(directory, memory, inputs))?;
+    let progress = StepProgress::new(print.progress_output());
+    let verdict = on_threads(threads::available(), || verify::verify_watched(directory, memory, inputs, &progress));
+    progress.finish();
+    let verdict = verdict?;
     let printed = print_result(&verdict, print);
     if verdict.verdict == Conclusion::Proved {
         return printed.map(|()| ExitCode::SUCCESS);
@@ -374,7 +379,7 @@ fn write_profile(terrain: &Path, lines: &Path, output: Option<&Path>, print: Pri
     let request = ProfileRequest { terrain: output_of(terrain)?, lines: lines.to_path_buf(), memory: MEMORY_FOR_LINES };
     let profile = on_threads(threads::available(), || profile::run(&request))?;
     if !print.quiet {
-        profile.warnings.iter().for_each(|warning| say(&format!("warning: {warning}")));
+        profile.warnings.iter().for_each(|warning| say(&ShownWarning(warning).to_string()));
     }
     match output {
         Some(file) => write_new_table(file, &profile)?,
@@ -465,13 +470,19 @@ fn test_gpu(_: Option<&str>, _: Option<usize>, _: PrintOptions) -> Result<ExitCo
 }
 
 fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<ExitCode> {
+    let progress = StepProgress::new(print.progress_output());
+    let count = |source: &Source| {
+        progress.begin("count points", source.records, "points");
+        Histogram::of(source, &|amount| progress.advance(amount))
+    };
     for file in &named(files)? {
         let described = on_threads(threads::available(), || {
             let source = points::open(file, &points::TextOptions::default())?;
-            let histogram = histogram.then(|| Histogram::of(&source)).transpose()?;
+            let histogram = histogram.then(|| count(&source)).transpose()?;
             SourceDescription { histogram, ..describe(&source) }.with_surface(&source)
-        })?;
-        print_result(&described, print)?;
+        });
+        progress.finish();
+        print_result(&described?, print)?;
     }
     Ok(ExitCode::SUCCESS)
 }

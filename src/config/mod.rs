@@ -57,7 +57,10 @@ pub fn load(path: &Path) -> Result<JobOptions> {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-            return Err(Error::Config(format!("there is no configuration file {}", path.display())));
+            return Err(Error::Config(format!(
+                "there is no configuration file {}; fix: correct its name, or write one with `gdt-batch init`",
+                path.display()
+            )));
         }
         Err(e) => return Err(Error::Config(format!("cannot read the configuration {}: {e}", path.display()))),
     };
@@ -259,9 +262,10 @@ fn old_names(text: &str) -> Warnings {
     for Renamed { table, key, value, now } in RENAMED {
         let Some(found) = file.get(table).and_then(|table| table.get(key)) else { continue };
         match value {
-            None => warnings.push(format!("[{table}] {key} has a new name: {now}; the old one still works")),
+            None => warnings.push(format!("[{table}] {key} is an old name, which still works; fix: write {now}")),
             Some(value) if found.as_str() == Some(value) => {
-                warnings.push(format!("[{table}] {key} = \"{value}\" has a new name: {now}; the old one still works"));
+                warnings
+                    .push(format!("[{table}] {key} = \"{value}\" is an old name, which still works; fix: write {now}"));
             }
             Some(_) => {}
         }

@@ -65,8 +65,8 @@ pub(crate) fn as_pattern(option: &str, path: &str, base: &Path) -> (String, Opti
 
 fn meant_alone(option: &str, name: &str, other: &str) -> String {
     format!(
-        "{option}: something is called {name}, so only that is meant, although the pattern matches {other} too: name {other} as well, or \
-         rename {name}"
+        "{option}: {name} is the name of a file, so it is no pattern, and {other} is not read; fix: name {other} as well, or rename \
+         {name}"
     )
 }
 
@@ -143,9 +143,7 @@ mod tests {
         let (escaped, warning) = pattern("a[1].laz");
         assert_eq!(escaped, "a[[]1[]].laz");
         assert!(
-            warning
-                .unwrap()
-                .contains("something is called a[1].laz, so only that is meant, although the pattern matches a1.laz")
+            warning.unwrap().contains("a[1].laz is the name of a file, so it is no pattern, and a1.laz is not read")
         );
         // Folders too.
         std::fs::create_dir(folder.path().join("d [2]")).unwrap();

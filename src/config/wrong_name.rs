@@ -90,7 +90,9 @@ pub(crate) fn about_missing(tables: &[&str], name: &str) -> String {
     match (needed, first) {
         (Some(option), _) => format!("{} has no key {name}: add a line such as {}", option.table, option.line()),
         (None, Some(first)) => {
-            format!("there is no table {missing}: add it, with a line such as {} below it", first.line())
+            // The example of a directory is where the sample goes.
+            let line = if first.key == "directory" { "directory = \"out\"".into() } else { first.line() };
+            format!("there is no table {missing}: add it, with a line such as {line} below it")
         }
         (None, None) => format!("{name} is missing: add it"),
     }

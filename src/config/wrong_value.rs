@@ -5,7 +5,7 @@ use crate::config::option_list::{ConfigOption, options};
 use toml::{Table, Value};
 
 /// What the parser says of a value whose form is wrong. What the options themselves say is for people.
-const JARGON: [&str; 4] = ["invalid type", "invalid value", "invalid length", "unknown variant"];
+const JARGON: [&str; 5] = ["invalid type", "invalid value", "invalid length", "unknown variant", "wanted "];
 
 /// No suggestion is longer.
 const LONGEST: usize = 120;

@@ -158,7 +158,10 @@ mod tests {
         fs::write(root.join("b/readme.txt"), "What these files are.\n").unwrap();
         let (found, notes) = clouds(&root, &["a"]);
         assert_eq!(found, ["a/3.LAZ", "a/4.las", "a/*.laz"]);
-        assert!(notes.len() == 1 && notes[0].contains("5.csv is left out beside LAS and LAZ"), "{notes:?}");
+        assert!(
+            notes.len() == 1 && notes[0].contains("5.csv is not read, because the folder has LAS or LAZ"),
+            "{notes:?}"
+        );
         let (found, notes) = clouds(&root, &["b"]);
         assert_eq!(found, ["b/*.xyz"]);
         assert!(notes.len() == 1 && notes[0].contains("readme.txt"), "{notes:?}");

@@ -100,7 +100,7 @@ fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, (is_na
     let is_of_crs = draft.sets("to_crs") || is_named && !findings.unit_is_unknown;
     if !is_of_crs && !draft.sets("unit") {
         let unit = if findings.unit_is_unknown { "us-foot" } else { "metre" };
-        page.offer(&format!("unit = \"{unit}\""), "or \"metre\", \"foot\", \"us-foot\": whatever the files say");
+        page.offer(&format!("unit = \"{unit}\""), "or \"metre\", \"foot\", \"us-foot\": overrides the files");
     }
     page.blank();
     page.say(&findings.crs);

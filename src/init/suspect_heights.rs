@@ -12,7 +12,7 @@ pub(crate) fn line_for_nodata(draft: &Draft, error: &Error) -> Option<NeededLine
         return None;
     }
     let message = error.to_string();
-    let height = message.split(ADVICE).nth(1)?.split(',').next()?;
+    let height = message.split(ADVICE).nth(1)?.split([',', ' ']).next()?;
     let value = height.parse::<i64>().map(toml::Value::from).or_else(|_| height.parse::<f64>().map(toml::Value::from));
     let why = format!("The job stops: {message}. To leave such points out, remove the #.");
     Some(NeededLine::of_input("nodata", value.ok()?, &why))

@@ -54,7 +54,7 @@ fn chunks_are_found_without_their_table() {
     for (format, minor) in [(3, 2), (7, 4)] {
         let file = LasFile::new(minor, format, 2, 1000);
         let cloud = assert_reads(&file, "fixed", &unfinished(file.laz(&[300], false)));
-        assert!(first_warning(&cloud).contains("chunks is missing"), "{:?}", cloud.source.warnings);
+        assert!(first_warning(&cloud).contains("chunk table is missing"), "{:?}", cloud.source.warnings);
     }
     let layered = LasFile::new(4, 7, 0, 1000);
     assert_reads(&layered, "layered, variable", &unfinished(layered.laz(&[10, 400, 590], true)));

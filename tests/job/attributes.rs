@@ -254,7 +254,7 @@ fn texts_have_them_in_columns() {
     assert_eq!(found[&[0, 9]], (0, 500));
     let (found, said) = of_text("x,y,z\n0,0,1\n9,0,1\n0,9,1\n", "");
     assert!(found.values().all(|look| *look == (0, 0)));
-    for words in ["no column of classes", "no column of intensities", "`columns` under [input.csv]"] {
+    for words in ["no column of classes", "no column of intensities", "[input.csv] columns"] {
         assert!(said.contains(words), "{words}: {said}");
     }
 }

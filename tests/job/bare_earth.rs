@@ -219,7 +219,7 @@ fn inputs_are_written_with_their_classes() {
         assert!(!copy.exists() && !job.out().join("classified").exists());
         let both = bare_earth(&[path, text]).with("output", "classified = true").with("input", "crs = \"none\"");
         let warnings = both.report()["warnings"].to_string();
-        assert!(warnings.contains("c.csv is not in classified/: a text file has no classes"), "{warnings}");
+        assert!(warnings.contains("c.csv is not in classified/: only LAS and LAZ files are copied"), "{warnings}");
     }
 }
 

@@ -110,8 +110,8 @@ fn the_cure_of_a_geocentric_system_is_one_that_helps() {
         Job::on(&[&bare, &map]).with("input", line).run().refused(2, &[words[0], words[1], key]);
     }
     // The user states a CRS already, or the other file does.
-    let full = "The record is ignored: unless [input] crs, missing_crs or another file states";
-    let short = "its record of a geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored: [input] states";
+    let full = "the record is ignored";
+    let short = "its geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored, because [input] names another";
     for (files, line, words) in [
         (vec![&false_record], "crs = \"EPSG:26915\"", [short, full]),
         (vec![&false_record, &bare], "missing_crs = \"EPSG:26915\"", [short, full]),
@@ -163,10 +163,7 @@ fn the_unit_of_a_false_record_gives_way_to_every_other_statement() {
     let said = warnings(&Job::on(&[&silent]).report());
     assert!(said.contains("no input states a known unit of length: metres assumed; fix: set [input] unit"), "{said}");
     let said = warnings(&Job::on(&[&in_metres]).report());
-    assert!(
-        said.contains("taken as a plane in the unit metre") && !said.contains("no input states a known unit"),
-        "{said}"
-    );
+    assert!(said.contains("x and y are a plane in metre") && !said.contains("no input states a known unit"), "{said}");
 }
 
 #[test]
@@ -240,7 +237,7 @@ fn a_file_without_a_crs_beside_others_is_named() {
     for files in [[&bare, &coded], [&coded, &bare]] {
         let report = Job::on(&files).report();
         let said = warnings(&report);
-        assert!(said.contains("1 of 2 inputs name no CRS") && said.contains("bare.las"), "{said}");
+        assert!(said.contains("1 of 2 inputs have no CRS") && said.contains("bare.las"), "{said}");
         assert_eq!(report["crs"], "NAD83 / UTM zone 15N");
     }
     assert!(!warnings(&Job::on(&[&bare]).report()).contains("name no CRS"));
@@ -264,10 +261,7 @@ fn units_and_datums_of_height_are_told_apart() {
     for files in [[&plane, &feet], [&feet, &plane]] {
         let job = Job::on(&files);
         let said = warnings(&job.report());
-        assert!(
-            said.contains("1 of 2 inputs do not say the unit of their heights") && said.contains("plane.las"),
-            "{said}"
-        );
+        assert!(said.contains("1 of 2 inputs have no unit of heights") && said.contains("plane.las"), "{said}");
         let georeference: Value =
             serde_json::from_slice(&fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
         // However the file rounds it.
@@ -293,14 +287,11 @@ fn a_file_of_unknown_datum_does_not_let_two_datums_pass() {
     for files in [[&unknown, &nad83], [&nad83, &unknown]] {
         let report = Job::on(&files).report();
         let said = warnings(&report);
-        assert!(
-            said.contains("1 of 2 inputs do not say their datum, such as") && said.contains("unknown.las"),
-            "{said}"
-        );
-        assert!(said.contains("taken to be GCS_North_American_1983"), "{said}");
+        assert!(said.contains("1 of 2 inputs have no datum, such as") && said.contains("unknown.las"), "{said}");
+        assert!(said.contains("GCS_North_American_1983 assumed"), "{said}");
         assert_eq!(report["crs"], "UTM_15N");
     }
-    assert!(!warnings(&Job::on(&[&unknown]).report()).contains("do not say their datum"));
+    assert!(!warnings(&Job::on(&[&unknown]).report()).contains("have no datum"));
 }
 
 #[test]
@@ -357,7 +348,7 @@ fn degrees_in_the_hundred_thousands_are_a_plane_in_metres() {
     let job = Job::on(&[&scan]);
     let report = job.report();
     let said = warnings(&report);
-    assert!(said.contains("scan.las") && said.contains("WGS 84") && said.contains("no longitude"), "{said}");
+    assert!(said.contains("scan.las") && said.contains("WGS 84") && said.contains("in degrees, but x"), "{said}");
     assert_eq!((report["unit"].as_str(), report["crs"].as_str()), (Some("metre"), None));
     job.verified();
     let given = Job::on(&[&scan]).with("input", "crs = \"EPSG:26915\"").report();
@@ -505,7 +496,7 @@ fn a_file_without_a_system_whose_coordinates_look_like_degrees_is_named() {
             write(&mut bytes, 187 + 16 * axis, place - half);
         }
         fs::write(&file, bytes).unwrap();
-        let words = "look like longitude and latitude, and are taken as lengths";
+        let words = "look like longitude and latitude, but are taken as lengths";
         let job = |line: &str| Job::on(&[&file]).with("input", line);
         assert!(warnings(&job("").report()).contains(words), "{name}");
         assert!(!warnings(&job("crs = \"none\"").report()).contains(words), "{name}");

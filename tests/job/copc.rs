@@ -79,7 +79,7 @@ fn a_wrong_octree_leads_to_the_whole_file_and_a_warning() {
     assert_eq!(report["vertex_digest"], all["vertex_digest"]);
     assert_eq!(with.verified()["digest"], without.verified()["digest"]);
     let warnings = report["warnings"].as_array().unwrap();
-    let is_said = |text: &str| text.contains("a.copc.laz: 1 points lie elsewhere than its octree");
+    let is_said = |text: &str| text.contains("a.copc.laz: 1 points lie outside their cell of its octree");
     assert!(warnings.iter().any(|warning| is_said(warning.as_str().unwrap())), "{warnings:?}");
     assert_eq!((number(&report["points"]["not_decoded"]), &report["points"]["kept"]), (0, &all["points"]["kept"]));
     // A node too few is found out before anything is decoded.

@@ -331,7 +331,7 @@ fn degrees_are_refused_by_the_names_of_columns() {
         "x,y,z\ndeg E,deg N,m",
     ] {
         let text = Text::new(&format!("{header}\n{rows}"));
-        text.job().run().refused(2, &["cloud.csv", "degrees", "projected CRS", "unit"]);
+        text.job().run().refused(2, &["cloud.csv", "degrees", "to_crs", "unit"]);
         text.job().with("input", "unit = \"metre\"").run().refused(2, &["degrees", "unit says metre"]);
         run(&text.job().with("input", "crs = \"none\"\nunit = \"metre\""));
         run(&text.job().with("input", "crs = \"none\""));
@@ -356,6 +356,6 @@ fn colours_that_cannot_be_read_do_not_stop_a_job() {
     let rows: String = centimetres(50, plain).lines().skip(1).map(|row| format!("{row},red,-5,0x1\n")).collect();
     let text = Text::new(&format!("x,y,z,r,g,b\n{rows}"));
     let (report, _) = run(&text.job());
-    assert!(report["warnings"].to_string().contains("they are left out"), "{report}");
+    assert!(report["warnings"].to_string().contains("and are ignored"), "{report}");
     run(&text.job().with("output", "color = \"elevation\""));
 }

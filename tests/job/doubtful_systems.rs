@@ -119,7 +119,7 @@ fn depths_are_told_from_heights_and_said_to_be_depths() {
     let [up, down] =
         [("up.las", "1.0"), ("down.las", "-1.0")].map(|(name, way)| write(folder.path(), name, &esri(way)));
     let said = warnings(&Job::on(&[&down]).report());
-    assert!(said.contains("down.las") && said.contains("its z counts downwards (Local)"), "{said}");
+    assert!(said.contains("down.las") && said.contains("its z is a depth (Local)"), "{said}");
     assert_eq!(warnings(&ellipsoidal(&[&up]).report()), "[]");
     // Once the user has said what is meant, there is no more to say about the record.
     for choice in ["EPSG:25832+7837", "none"] {
@@ -130,14 +130,14 @@ fn depths_are_told_from_heights_and_said_to_be_depths() {
     for choice in ["auto", "first"] {
         let said = Job::on(&[&down, &silent]).with("input", &format!("crs = \"{choice}\"")).report();
         let said = warnings(&said);
-        assert!(said.contains("1 of 2 inputs, such as") && said.contains("its z counts downwards (Local)"), "{said}");
-        let words = "1 of 2 inputs do not say whether their z counts downwards, such as";
-        assert!(said.contains(words) && said.contains("silent.las: it is taken to count as"), "{choice}: {said}");
+        assert!(said.contains("1 of 2 inputs, such as") && said.contains("its z is a depth (Local)"), "{said}");
+        let words = "1 of 2 inputs do not state whether z is a height or a depth, such as";
+        assert!(said.contains(words) && said.contains("silent.las: a depth assumed, as"), "{choice}: {said}");
     }
     let info = gdt_batch(folder.path(), &["info", "down.las"]);
-    assert!(info.out.contains("its z counts downwards (Local)"), "{info:?}");
+    assert!(info.out.contains("its z is a depth (Local)"), "{info:?}");
     let given = Job::on(&[&up]).with("input", "crs = \"EPSG:25832+5715\"").report();
-    assert!(warnings(&given).contains("its z counts downwards (EPSG:5715)"), "{given}");
+    assert!(warnings(&given).contains("its z is a depth (EPSG:5715)"), "{given}");
 }
 
 /// Moves a file's box and points to longitude 11.5 and latitude 48.1.
@@ -157,12 +157,12 @@ fn a_projected_system_over_degrees_is_a_warning() {
     let [far, near] = ["far.las", "near.las"].map(|name| write(folder.path(), name, &[code(25832)]));
     move_to_degrees(&far);
     // Its area of use does not reach to the equator.
-    Job::on(&[&far]).run().refused(3, &["far.las", "As longitude and latitude, they lie within it: [input] crs"]);
+    Job::on(&[&far]).run().refused(3, &["far.las", "as longitude and latitude, they lie within it: [input] crs"]);
     let said = Job::on(&[&far]).with("input", "outside_crs_area = \"warn\"").run_with(&["check"]);
     let said = format!("{}{}", said.out, said.err);
-    assert!(said.contains("far.las") && said.contains("as longitudes and latitudes are"), "{said}");
+    assert!(said.contains("far.las") && said.contains("look like longitude and latitude"), "{said}");
     let said = Job::on(&[&near]).run_with(&["check"]);
-    assert!(!said.out.contains("as longitudes"), "{said:?}");
+    assert!(!said.out.contains("look like longitude"), "{said:?}");
 }
 
 #[test]

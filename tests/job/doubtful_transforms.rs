@@ -87,7 +87,7 @@ fn columns_of_degrees_are_no_coordinates_of_a_map_and_latitudes_end_at_the_poles
     let lengths = write("lengths.csv", "x [m],y [m],z [m]", [0, 1]);
     let lines = "missing_crs = \"EPSG:4269\"\nto_crs = \"EPSG:3857\"\ndatums = \"close\"";
     let said = warnings(&Job::on(&[&lengths]).with("input", lines).report());
-    assert!(said.contains("says that their unit is the metre") && said.contains("0.71 m on the ground"), "{said}");
+    assert!(said.contains("name the unit metre") && said.contains("0.71 m on the ground"), "{said}");
 }
 
 #[test]

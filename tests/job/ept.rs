@@ -72,7 +72,7 @@ fn an_interrupted_job_goes_on_unless_the_data_set_has_changed() {
     });
     files.edit("ept-data/0-0-0-0.bin", |bytes| bytes.truncate(bytes.len() - bytes.len() / points));
     files.write(folder.path());
-    Job::on(&[&index]).run().refused(3, &["ept.json", "1 of them are not there"]);
+    Job::on(&[&index]).run().refused(3, &["ept.json", "1 is missing"]);
     let said = job.run().succeeded();
     assert!(said.err.contains("ept.json; starting over"), "{}", said.err);
     fs::remove_file(folder.path().join("ept-data/1-0-0-0.bin")).unwrap();

@@ -186,20 +186,22 @@ fn one_bad_file_of_several_is_left_out() {
 #[test]
 fn a_few_points_that_stretch_the_area_are_told_with_the_bounds_of_the_others() {
     let far: Vec<[i32; 3]> = (0..4).map(|i| [200_000 + 50_000 * i, 300_000, 100]).collect();
-    let hint = " stretch the area to 3500 x 3000: to leave them out, set [input] bounds = [";
+    let (hint, fix) = (" stretch the area to 3500 x 3000", "fix: [input] bounds = [");
     for header in [Header::All, Header::Near, Header::Zeros] {
         let cloud = Far::of(near(6000, 8000), &far, 5000, header, 2);
         let report = cloud.job().report();
         assert_eq!(number(&report["points"]["kept"]), 6004);
         let warnings = report["warnings"].to_string();
         assert!(
-            warnings.contains("99.93 % of the points lie within 80 x 80 units") && warnings.contains(hint),
+            warnings.contains("99.93 % of the points lie within 80 x 80 units")
+                && warnings.contains(hint)
+                && warnings.contains(fix),
             "{warnings}"
         );
     }
     let cloud = Far::of(near(6000, 8000), &far, 5000, Header::All, 2);
     let said = cloud.job().with("output.raster", "resolution = 0.01").run_with(&["check"]);
-    assert!(said.code != 0 && said.err.contains(hint), "{}", said.err);
+    assert!(said.code != 0 && said.err.contains(hint) && said.err.contains(fix), "{}", said.err);
     let bounds = "bounds = [499999.0, 3999999.0, 500081.0, 4000081.0]";
     assert!(!cloud.job().with("input", bounds).report()["warnings"].to_string().contains("stretch"));
 }
@@ -226,7 +228,7 @@ fn a_handful_of_points_stretches_a_sparse_survey_and_a_benchmark_does_not() {
 fn malformed_records_of_other_files_are_named() {
     let clouds = [40, 200, 300].map(|at| Far::new(500, &[ZERO], at, Header::All));
     let job = Job::on(&[&clouds[0].path, &clouds[1].path, &clouds[2].path]);
-    let words = ["3 of 1503 records are malformed", "; 2 more in ", "cloud.las and 1 other file. Repair"];
+    let words = ["3 of 1503 records are malformed", "; 2 more in ", "cloud.las and 1 other file"];
     job.run().refused(3, &words);
     job.run_with(&["check"]).refused(3, &words);
 }

@@ -202,7 +202,7 @@ fn a_curve_keeps_all_triangles_and_a_warning_says_so() {
     assert_eq!(leaves_out_the_slivers(&cloud, 1_000_000), 0);
     let folder = tempfile::tempdir().unwrap();
     let file = clouds::write(folder.path(), "cloud.csv", &cloud);
-    let warns = |job: Job| job.report()["warnings"].to_string().contains("nothing is left out along the hull");
+    let warns = |job: Job| job.report()["warnings"].to_string().contains("no slivers are left out along the hull");
     assert!(
         warns(Job::on(&[&file]))
             && warns(Job::on(&[&file]).tiles_of(300))

@@ -214,7 +214,7 @@ fn clouds_of_which_no_job_can_be_made_are_refused_as_check_refuses_them() {
     let Some(data) = shared().map(|folder| folder.join("data")) else { return };
     for (name, words) in [
         ("utm15.las", "utm15.las: the points make no triangle"),
-        ("bad/1.2-no-points.las", "none of them is there"),
+        ("bad/1.2-no-points.las", "all are missing"),
         ("bad/badheader.txt", "names 2 columns x"),
         ("bad/git-lfs-pointer.laz", "git lfs pull"),
     ] {

@@ -57,10 +57,12 @@ fn a_list_stands_for_its_files_and_those_outside_the_bounds_are_not_opened() {
     let report = Job::on(&[&vpc]).with("input", bounds).report();
     assert_eq!(results(&report), results(&expected));
     let warnings = report["warnings"].to_string();
-    assert!(warnings.contains("list.vpc: 1 of its 3 files were not opened"), "{warnings}");
+    assert!(warnings.contains("list.vpc: 1 of its 3 files lie outside [input] bounds or clip"), "{warnings}");
     let check = Job::on(&[&vpc]).with("input", bounds).run_with(&["check", "--json"]).succeeded().json();
     assert_eq!(check["files"].as_array().unwrap().len(), 2);
-    Job::on(&[&vpc]).run().refused(3, &["list.vpc: names", "clouds/far, and there is no such file"]);
+    Job::on(&[&vpc]).run().refused(3, &["list.vpc: names", "clouds/far, which does not exist"]);
+    let skipped = Job::on(&[&vpc]).with("input", "on_bad_file = \"skip\"").report();
+    assert!(skipped["skipped"].to_string().contains("clouds/far"), "{skipped}");
     let apart = "bounds = [500.0, 0.0, 600.0, 30.0]";
     Job::on(&[&vpc])
         .with("input", apart)

@@ -65,7 +65,11 @@ const IN_INPUT: [(&str, &[&str]); 19] = [
 ];
 
 /// A line for `[output]`, and what the message has.
-const IN_OUTPUT: [(&str, &[&str]); 16] = [
+const IN_OUTPUT: [(&str, &[&str]); 17] = [
+    (
+        "[output.raster]\nresolution = 1.0\npmtiles = true",
+        &["line 7: [output.raster] pmtiles takes \"terrarium\" or \"terrain-rgb\""],
+    ),
     ("raster = 2.0", &["line 5: [output] raster takes a table", "did you mean raster = { resolution = 2.0 }?"]),
     ("[output.raster]\norigin = [0, 0]", &["line 5: [output.raster] has no key resolution", "resolution = 1.0"]),
     (
@@ -156,6 +160,35 @@ fn a_path_with_an_escape_that_toml_knows_is_explained_too() {
     fs::write(folder.path().join("job.toml"), text).unwrap();
     gdt_batch(folder.path(), &["check", "job.toml"])
         .refused(2, &["there is no file C:", "a backslash has a meaning of its own"]);
+}
+
+#[test]
+fn mistakes_about_files_are_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    clouds::write(folder.path(), "a.csv", &clouds::uniform(50, 1_000, 9));
+    fs::create_dir(folder.path().join("empty")).unwrap();
+    write("list.txt", "a.csv\nnotes for me\nb.csv\n");
+    write("gone.txt", "a.csv\ngone.csv\n");
+    write("scan.ply", "ply\nformat ascii 1.0\nelement vertex 3\n");
+    write("names.csv", "id,foo,bar\n1,2,3\n4,5,6\n7,8,9\n");
+    write("far.toml", "[input]\nfiles = [\"a.csv\"]\nbounds = [9e6, 9e6, 1e7, 1e7]\n[output]\ndirectory = \"out\"\n");
+    write("pattern.toml", "[input]\nfiles = [\"tiles/*.laz\"]\n[output]\ndirectory = \"out\"\n");
+    write("no-table.toml", "[input]\nfiles = [\"a.csv\"]\n");
+    for (word, code, what, fix) in [
+        ("b.laz", 2, "there is no file b.laz", "correct its name"),
+        ("jop.toml", 2, "there is no configuration file jop.toml", "\n  fix: correct its name, or write one"),
+        ("pattern.toml", 2, "[input] files: there is no file tiles/*.laz", "\n  fix: correct the path"),
+        ("no-table.toml", 2, "there is no table [output]", "directory = \"out\""),
+        ("far.toml", 3, "no point is left to triangulate", "\n  fix: [input] bounds"),
+        ("empty", 2, "empty has no point clouds", "name files or folders"),
+        ("list.txt", 3, "list.txt: line 2: \"notes for me\" is not a point cloud", "\n  fix: remove the line"),
+        ("gone.txt", 3, "gone.txt: names gone.csv, which does not exist", "\n  fix: correct the list"),
+        ("scan.ply", 3, "scan.ply: is PLY", "convert it to LAZ first"),
+        ("names.csv", 3, "names.csv: the first line", "name the columns"),
+    ] {
+        gdt_batch(folder.path(), &[word]).refused(code, &["error: ", what, fix]);
+    }
 }
 
 #[test]

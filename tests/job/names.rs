@@ -100,7 +100,7 @@ fn a_file_that_is_called_like_a_pattern_can_be_named() {
         let report = job(&format!("[\"{name}\"]")).succeeded().json();
         assert_eq!(number(&report["sites"]), 144, "{name}");
         let warnings = report["warnings"].to_string();
-        assert_eq!(warnings.contains("so only that is meant"), other.is_some(), "{name}: {warnings}");
+        assert_eq!(warnings.contains("so it is no pattern"), other.is_some(), "{name}: {warnings}");
         assert!(other.is_none_or(|other| warnings.contains(other)), "{name}: {warnings}");
     }
     write_square(&root.path().join("d [2]/e.xyz"), 0, 12);

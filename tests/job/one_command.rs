@@ -198,7 +198,7 @@ fn a_folder_in_a_configuration_stands_for_its_clouds() {
         let report = run(files).succeeded().json();
         assert_eq!(report["file_list"], by_pattern["file_list"], "{files}");
         let warnings = report["warnings"].to_string();
-        assert!(warnings.contains("notes.txt is left out beside LAS and LAZ"), "{warnings}");
+        assert!(warnings.contains("notes.txt is not read, because the folder has LAS or LAZ"), "{warnings}");
     }
     // Texts count where there is nothing else.
     fs::create_dir_all(root.join("texts/inner")).unwrap();

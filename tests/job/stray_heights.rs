@@ -259,7 +259,7 @@ fn the_heights_of_the_advice_are_those_of_all_files() {
         &["valley.las: 2 points have the height 6000", "[input] heights = [840, 1940] leaves them out"],
     );
     let beyond = files.grid("beyond.xyz", 100, &[599_000, 600_000, 601_000].repeat(200));
-    warns(&[&valley, &beyond], &["valley.las", "remove them from the file: [input] heights holds for all files"]);
+    warns(&[&valley, &beyond], &["valley.las", "remove them from the file ([input] heights holds for all files"]);
     let job = Job::on(&[&valley, &mount]).with("input", "heights = [840, 960]");
     let warnings = job.report()["warnings"].to_string();
     assert!(

@@ -409,7 +409,7 @@ fn an_input_that_is_edited_in_place_is_told() {
     copy.set_modified(SystemTime::UNIX_EPOCH + Duration::from_secs(1_700_000_000)).unwrap();
     task(&job, "publish", "1/1").succeeded();
     let warnings = report(&job)["warnings"].to_string();
-    assert!(warnings.contains("large.csv: the time of its last change is another one than when the job was planned"));
+    assert!(warnings.contains("large.csv: its modification time differs from that when the job was planned"));
     up_to(&job, "join", 2);
     edit(200);
     local(&job, 2).succeeded();

@@ -56,10 +56,7 @@ fn a_text_that_says_one_unit_for_all_columns_says_that_of_its_heights() {
     }
     let (found, said) = metres(&[&silent, &centimetre], "");
     assert_eq!(found, [1.0, 0.01]);
-    assert!(
-        said.contains("1 of 2 inputs do not say the unit of their heights, such as") && said.contains("none.csv"),
-        "{said}"
-    );
+    assert!(said.contains("1 of 2 inputs have no unit of heights, such as") && said.contains("none.csv"), "{said}");
     assert_eq!(metres(&[&metre, &silent], "").0, [1.0, 1.0]);
     // The first file is right, says the user.
     assert_eq!(metres(&[&metre, &centimetre], "crs = \"first\"").0, [1.0, 1.0]);
@@ -74,7 +71,7 @@ fn a_crs_of_the_user_takes_no_unit_of_heights_away() {
     for (file, metre) in [(&feet, 0.3048), (&las, US_FOOT)] {
         let (found, said) = metres(&[file], "crs = \"EPSG:26915\"");
         assert_eq!(found, [1.0, metre]);
-        assert!(said.contains("[input] crs (NAD83 / UTM zone 15N (EPSG:26915)) says no unit of heights"), "{said}");
+        assert!(said.contains("[input] crs (NAD83 / UTM zone 15N (EPSG:26915)) has no unit of heights"), "{said}");
         assert_eq!(metres(&[file], "crs = \"EPSG:26915+5703\"").0, [1.0, 1.0]);
     }
     let both = Job::on(&[&feet, &las]).with("input", "crs = \"EPSG:26915\"").run();
@@ -90,8 +87,8 @@ fn the_first_file_may_leave_the_unit_of_heights_to_another_with_a_warning() {
     for choice in ["auto", "first"] {
         let (found, said) = metres(&[&plain, &feet], &format!("crs = \"{choice}\""));
         assert_eq!(found, [1.0, US_FOOT], "{choice}");
-        let words = "1 of 2 inputs do not say the unit of their heights, such as";
-        assert!(said.contains(words) && said.contains("m.las: it is taken to be US survey foot"), "{choice}: {said}");
+        let words = "1 of 2 inputs have no unit of heights, such as";
+        assert!(said.contains(words) && said.contains("m.las: US survey foot assumed"), "{choice}: {said}");
     }
 }
 
@@ -126,15 +123,15 @@ fn the_unit_of_the_user_is_that_of_all_columns() {
     // What a foot is, the text does not say.
     let (found, said) = metres(&[&feet], "unit = \"us-foot\"");
     assert_eq!(found, [US_FOOT, US_FOOT]);
-    assert!(!said.contains("say otherwise") && !said.contains("heights are in another unit"), "{said}");
+    assert!(!said.contains("overrides") && !said.contains("heights are in another unit"), "{said}");
     // Which foot it is asks whoever has not stated it.
-    assert!(!said.contains("say feet, but not which") && metres(&[&feet], "").1.contains("say feet, but not which"));
+    assert!(
+        !said.contains("are in feet of an unknown kind")
+            && metres(&[&feet], "").1.contains("are in feet of an unknown kind")
+    );
     let (found, said) = metres(&[&feet, &metre], "unit = \"metre\"");
     assert_eq!(found, [1.0, 1.0]);
-    assert!(
-        said.contains("the columns of 1 of 2 inputs say otherwise, such as") && said.contains("ft.csv: foot"),
-        "{said}"
-    );
+    assert!(said.contains("overrides the unit of its columns") && said.contains("(foot)"), "{said}");
     assert_eq!(metres(&[&csv(&folder, "cm.csv", "x [m],y [m],z [cm]")], "unit = \"foot\"").0, [0.3048, 0.01]);
 }
 
@@ -148,12 +145,12 @@ fn files_without_a_unit_beside_a_text_with_one_are_named() {
         let (found, said) = metres(&[&other, silent], "");
         assert_eq!(found, [0.001, 0.001]);
         let name = silent.file_name().unwrap().to_str().unwrap();
-        let words = "1 of 2 inputs do not say the unit of their coordinates, such as";
-        assert!(said.contains(words) && said.contains(&format!("{name}: it is taken to be 0.001 m")), "{said}");
+        let words = "1 of 2 inputs have no unit of length, such as";
+        assert!(said.contains(words) && said.contains(&format!("{name}: 0.001 m assumed")), "{said}");
     }
     let named = write(folder.path(), "named.las", &[text(r#"PROJCS["Site grid",GEOGCS["g"],PROJECTION["x"]]"#)]);
-    assert!(metres(&[&other, &named], "").1.contains("do not say the unit of their coordinates"));
-    assert!(!metres(&[&other, &bare], "unit = \"metre\"").1.contains("do not say the unit"));
+    assert!(metres(&[&other, &named], "").1.contains("have no unit of length"));
+    assert!(!metres(&[&other, &bare], "unit = \"metre\"").1.contains("have no unit"));
 }
 
 /// NAD83 / UTM 15N without a code.
@@ -207,16 +204,16 @@ fn a_record_that_is_left_aside_and_states_another_unit_is_named() {
     let las = write(folder.path(), "metre.las", &[code(26915)]);
     let (found, said) = metres(&[&las], "crs = \"none\"\nunit = \"foot\"");
     assert_eq!(found, [0.3048, 0.3048]);
-    let words = "the coordinates are taken in foot, though 1 of 1 inputs state another unit, such as";
-    assert!(said.contains(words) && said.contains("metre.las: metre for x and y"), "{said}");
-    assert!(!metres(&[&las], "crs = \"none\"\nunit = \"metre\"").1.contains("state another unit"));
+    let words = "ignores its unit";
+    assert!(said.contains(words) && said.contains("(metre for x and y)"), "{said}");
+    assert!(!metres(&[&las], "crs = \"none\"\nunit = \"metre\"").1.contains("ignores its unit"));
     let heights = write(folder.path(), "heights.las", &[keys(&FEET_OF_HEIGHT)]);
     let (found, said) = metres(&[&heights], "crs = \"none\"\nunit = \"metre\"");
     assert_eq!(found, [1.0, 1.0]);
-    assert!(said.contains("heights.las: US survey foot for z"), "{said}");
+    assert!(said.contains("(US survey foot for z)"), "{said}");
     let (found, said) = metres(&[&heights], "unit = \"metre\"");
     assert_eq!(found, [1.0, US_FOOT]);
-    assert!(said.contains("[input] unit is that of x and y alone"), "{said}");
+    assert!(said.contains("[input] unit sets that of x and y alone"), "{said}");
 }
 
 #[test]
@@ -230,7 +227,7 @@ fn a_unit_of_length_over_columns_of_degrees_must_be_stated_twice() {
     Job::on(&[&path]).with("input", "unit = \"metre\"").run().refused(2, &words);
     let (found, said) = metres(&[&path], "unit = \"metre\"\ncrs = \"none\"");
     assert_eq!(found, [1.0, 1.0]);
-    assert!(said.contains("degrees.csv: degree for x and y"), "{said}");
+    assert!(said.contains("(degree for x and y)"), "{said}");
 }
 
 #[test]
@@ -241,15 +238,13 @@ fn the_unit_of_a_record_without_a_system_is_that_of_the_plane_unless_the_user_st
     let (found, said) = metres(&[&bare], "unit = \"metre\"");
     assert_eq!(found[0], 1.0);
     assert!(
-        said.contains(
-            "[input] unit takes coordinates to be in metre, though the records of 1 of 1 inputs say otherwise"
-        ) && said.contains("key.las: US survey foot"),
+        said.contains("[input] unit (metre) overrides the unit of its records") && said.contains("(US survey foot)"),
         "{said}"
     );
-    assert!(!metres(&[&bare], "unit = \"us-foot\"").1.contains("say otherwise"));
+    assert!(!metres(&[&bare], "unit = \"us-foot\"").1.contains("overrides"));
     let geocentric =
         write(folder.path(), "false.las", &[keys(&[[1024, 0, 1, 3], [2048, 0, 1, 4978], [2052, 0, 1, 9002]])]);
     let (found, said) = metres(&[&geocentric], "");
     assert_eq!(found[0], 0.3048);
-    assert!(said.contains("they are taken as a plane in the unit foot"), "{said}");
+    assert!(said.contains("x and y are a plane in foot"), "{said}");
 }

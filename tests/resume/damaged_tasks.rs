@@ -44,7 +44,7 @@ fn other_times_of_the_inputs_cost_tasks_nothing() {
     assert!(end.err.contains("publish: done") && !end.err.contains("mesh: done"), "{}", end.err);
     // Only a warning tells of the times.
     let report = rig.has_all_results("with other times");
-    assert!(String::from_utf8(report).unwrap().contains("the time of its last change is another one"));
+    assert!(String::from_utf8(report).unwrap().contains("its modification time differs"));
 }
 
 #[test]

@@ -19,15 +19,17 @@ pub fn from_records(
     let problems = text.as_ref().map_or_else(|| geotiff::problems(records), Crs::problems);
     for doubt in problems {
         let label = used.map_or("unknown".into(), Crs::label);
-        warnings
-            .push(format!("its coordinate system ({label}): {doubt} (set [input] crs or unit to say what is meant)"));
+        warnings.push(format!(
+            "its coordinate system ({label}): {doubt}; fix: [input] crs or [input] unit, if that is wrong"
+        ));
     }
     if let (Some(text), Some(keys)) = (&text, &keys)
         && let differences = text.differences(keys)
         && !differences.is_empty()
     {
         warnings.push(format!(
-            "its two coordinate systems differ: {} as text (used) and {} as GeoTIFF keys differ in {}",
+            "it has two coordinate systems: {} as WKT (used) and {} as GeoTIFF keys; they differ in {}; fix: [input] crs, if the first \
+             is wrong",
             text.label(),
             keys.label(),
             differences.join(" and ")
@@ -48,7 +50,8 @@ fn from_texts(texts: impl Iterator<Item = Result<Vec<u8>>>, warnings: &mut Warni
         match from_wkt::parse(&text) {
             Some(crs) => return Ok(Some(crs)),
             None if text.trim_matches(['\0', ' ', '"', '\'']).is_empty() => {}
-            None => warnings.push("its coordinate system is not well-known text that can be read"),
+            None => warnings
+                .push("its coordinate system is not well-known text that can be read; fix: [input] crs = \"EPSG:...\""),
         }
     }
     Ok(None)

@@ -13,9 +13,9 @@ const FARTHEST: f64 = 800.0;
 pub fn plausible(crs: Crs, min: [f64; 3], max: [f64; 3], warnings: &mut Warnings) -> Crs {
     if crs.kind == CrsKind::Projected && is_within_degrees(min, max) && !is_near_origin(&crs) {
         warnings.push(format!(
-            "its coordinate system ({}) is a map projection, but its coordinates are x {} to {} and y {} to {}, as longitudes and \
-             latitudes are, or a site's own grid: they are taken as the system says (if they are degrees, transform the points; if they \
-             are a plane, set [input] crs = \"none\")",
+            "its coordinate system ({}) is a map projection, but x ({} to {}) and y ({} to {}) look like longitude and latitude, or a \
+             local grid; fix: [input] crs = \"EPSG:4326\" and [input] to_crs = \"utm\" for degrees, [input] crs = \"none\" for a local \
+             grid",
             crs.label(),
             min[0],
             max[0],
@@ -29,9 +29,8 @@ pub fn plausible(crs: Crs, min: [f64; 3], max: [f64; 3], warnings: &mut Warnings
         return crs;
     }
     warnings.push(format!(
-        "its coordinate system ({}) is in degrees, but its coordinates are x {} to {} and y {} to {}, which no longitude and \
-         latitude is. The record is ignored: unless [input] crs, missing_crs or another file states what the points are in, they are taken \
-         as a plane",
+        "its coordinate system ({}) is in degrees, but x ({} to {}) and y ({} to {}) are not: the record is ignored; fix: [input] crs = \
+         \"EPSG:...\", or \"none\" for a local grid",
         crs.label(),
         min[0],
         max[0],
@@ -81,7 +80,7 @@ mod tests {
         let warned = |crs: &Crs, min: [f64; 3], max: [f64; 3]| {
             let mut warnings = Warnings::default();
             assert_eq!(plausible(crs.clone(), min, max, &mut warnings), *crs);
-            warnings.iter().any(|warning| warning.contains("as longitudes and latitudes are"))
+            warnings.iter().any(|warning| warning.contains("look like longitude and latitude"))
         };
         let utm = from_epsg(25832).unwrap();
         let (low, high) = ([11.5, 48.1, 500.0], [11.6, 48.2, 600.0]);

@@ -41,7 +41,7 @@ impl Crs {
     pub fn depths(&self) -> Option<String> {
         let heights = self.vertical_system.as_ref().filter(|heights| heights.is_depth() == Some(true))?;
         Some(format!(
-            "its z counts downwards ({}), and is taken as a height: the terrain is upside down (multiply z by -1 first)",
+            "its z is a depth ({}), but is taken as a height, so the terrain is upside down; fix: multiply z by -1 first",
             heights.label()
         ))
     }

@@ -37,14 +37,16 @@ impl Histogram {
         shares
     }
 
-    /// Counts all points of `source`, on the threads of the current rayon pool.
+    /// Counts all points of `source`, on the threads of the current rayon pool. Calls `done` with numbers of points that were counted.
     ///
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Input`] if the file cannot be read or has changed since it was opened.
-    pub fn of(source: &Source) -> Result<Histogram> {
+    pub fn of(source: &Source, done: &(dyn Fn(u64) + Sync)) -> Result<Histogram> {
         let count = |chunk| {
             let mut counts = RecordCounts::default();
-            source.read_chunk(chunk, ChunkRequest::all(), &mut counts).map(|()| counts)
+            source.read_chunk(chunk, ChunkRequest::all(), &mut counts)?;
+            done(counts.records());
+            Ok(counts)
         };
         let none = RecordCounts::default;
         let _ahead = source.read_ahead(None, false)?;
@@ -108,6 +110,10 @@ impl Default for RecordCounts {
 }
 
 impl RecordCounts {
+    fn records(&self) -> u64 {
+        self.classes.iter().sum::<u64>() + self.malformed
+    }
+
     fn with(mut self, other: &RecordCounts) -> RecordCounts {
         self.classes.iter_mut().zip(&other.classes).for_each(|(count, other)| *count += other);
         self.returns.iter_mut().zip(&other.returns).for_each(|(count, other)| *count += other);

@@ -11,7 +11,7 @@ use crate::surface::{MeshOf, Surface, SurfaceShares};
 use crs::system::Crs;
 use crs::unit::Unit;
 use sys::terminal::one_line;
-use sys::{Result, Warnings};
+use sys::{Result, ShownWarning, Warnings};
 
 /// The output of `gdt-batch info`: `Display` is for people, `Serialize` for programs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -157,7 +157,8 @@ impl fmt::Display for SourceDescription {
             write!(f, "{histogram}")?;
         }
         for warning in self.warnings.iter() {
-            writeln!(f, "  warning  {}", one_line(warning))?;
+            let shown = ShownWarning(warning).to_string();
+            writeln!(f, "  {}", shown.replacen("warning: ", "warning  ", 1).replace("\n  fix: ", "\n  fix      "))?;
         }
         Ok(())
     }

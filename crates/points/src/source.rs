@@ -230,7 +230,10 @@ fn open_las(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
     };
     if missing > 0 {
         let held = header.records - missing;
-        warnings.push(format!("the header promises {} points, but the file has only {held}", header.records));
+        warnings.push(format!(
+            "the header gives {} points, but the file has only {held}; fix: copy the file again",
+            header.records
+        ));
     }
     let mut source = Source {
         path: file.path().to_path_buf(),

@@ -5,8 +5,7 @@ use crate::source::Source;
 use crs::choice::CrsChoice;
 use crs::system::{Crs, CrsKind};
 use crs::unit::Unit;
-use sys::Error;
-use sys::Result;
+use sys::{Error, Result, ShownWarning};
 
 /// Returns what a source of a job that transforms points is in.
 ///
@@ -26,9 +25,8 @@ pub(crate) fn stated_crs(source: &Source, all: &[Source], options: &InputOptions
     };
     if !named.is_named() {
         return Err(Error::Config(format!(
-            "{}: it names no CRS{}, and [input] to_crs needs to know what its coordinates are in: say with [input] missing_crs what the \
-             files without a CRS are in, such as \"EPSG:4326\" for longitude and latitude of WGS 84, or with [input] crs what all files \
-             are in",
+            "{}: it names no CRS{}, and [input] to_crs needs one; fix: [input] missing_crs for the files without a CRS, such as \
+             \"EPSG:4326\" for longitude and latitude of WGS 84, or [input] crs for all files",
             source.path.display(),
             found_in(source)
         )));
@@ -83,8 +81,9 @@ fn refuse_map_of_degrees(source: &Source, named: &Crs, options: &InputOptions) -
 fn found_in(source: &Source) -> String {
     const WORDS: [&str; 2] = ["coordinate system", "variable length records"];
     let is_meant = |warning: &str| WORDS.iter().any(|word| warning.contains(word));
-    let all = source.warnings.iter().map(|warning| warning.to_string());
-    let of_system: Vec<String> = all.filter(|warning| is_meant(warning)).collect();
+    // The remedies are others here.
+    let all = source.warnings.iter().map(|warning| ShownWarning(warning).what());
+    let of_system: Vec<&str> = all.filter(|warning| is_meant(warning)).collect();
     if of_system.is_empty() { String::new() } else { format!(" that can be read ({})", of_system.join("; ")) }
 }
 

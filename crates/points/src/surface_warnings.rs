@@ -17,16 +17,16 @@ pub fn no_ground(options: &InputOptions, counts: &PointCounts) -> Option<String>
         return None;
     }
     Some(format!(
-        "surface = \"ground\" takes classes 2, 8, 9 and 20, and the points have {}: set surface = \"bare-earth\" to \
-         let the program find the ground, or choose what is there with `classes`",
+        "surface = \"ground\" takes classes 2, 8, 9 and 20, and the points have {}; fix: [input] surface = \"bare-earth\" finds the \
+         ground, [input] classes takes other classes",
         listed(counts)
     ))
 }
 
 /// Returns what to do about a text without a column of classes, if the job wants the ground.
 pub fn no_column_of_classes() -> String {
-    "surface = \"ground\" takes classes 2, 8, 9 and 20, and the file has no column of classes: set surface = \"bare-earth\" to let the \
-     program find the ground, name the column with `columns` under [input.csv], or leave `surface` out to make the mesh of all points"
+    "surface = \"ground\" takes classes 2, 8, 9 and 20, and the file has no column of classes; fix: [input] surface = \"bare-earth\" \
+     finds the ground; [input.csv] columns names the column, if there is one"
         .into()
 }
 
@@ -38,16 +38,16 @@ pub fn unclear_returns(options: &InputOptions, counts: &PointCounts) -> Option<S
     }
     let rule = match options.kept_returns() {
         KeptReturns::All => return None,
-        KeptReturns::First => "one without a number counts as the first",
-        KeptReturns::Last => "one counts as the last if its number is not less than that of the returns",
-        KeptReturns::Numbers(_) => "one without a number counts as number 1",
+        KeptReturns::First => "they are taken as first returns",
+        KeptReturns::Last => "they are last returns if the number is not below the number of returns",
+        KeptReturns::Numbers(_) => "they are taken as number 1",
     };
     // Points of other classes are not looked at.
     let kept = options.kept_classes();
     let all: u64 = counts.classes.iter().filter(|&(&class, _)| kept[class as usize]).map(|(_, count)| count).sum();
     (counts.unclear_returns > 0).then(|| {
         format!(
-            "{} of the points ({} of {all}) do not say clearly which return of how many they are: {rule}",
+            "{} of the points ({} of {all}) have no valid return number: {rule}",
             percent(counts.unclear_returns, all),
             counts.unclear_returns
         )
@@ -87,11 +87,11 @@ mod tests {
         let ground = options("surface = \"ground\"");
         let what = no_ground(&ground, &counts(&[(1, 95), (5, 4), (70, 1)], 0)).unwrap();
         assert!(
-            what.contains("have class 1 (unclassified, 95 %), class 5 (high vegetation, 4 %), class 70 (1 %): set surface = \"bare-earth\""),
+            what.contains("have class 1 (unclassified, 95 %), class 5 (high vegetation, 4 %), class 70 (1 %); fix: [input] surface = \"bare-earth\""),
             "{what}"
         );
         let many: Vec<(u8, u64)> = (30..60).map(|class| (class, 1)).collect();
-        assert!(no_ground(&ground, &counts(&many, 0)).unwrap().contains("class 37 (3 %), 22 more: set"));
+        assert!(no_ground(&ground, &counts(&many, 0)).unwrap().contains("class 37 (3 %), 22 more; fix"));
         assert_eq!(no_ground(&ground, &counts(&[(1, 95), (20, 1)], 0)), None);
         assert_eq!(no_ground(&ground, &counts(&[], 0)), None);
         assert_eq!(no_ground(&options(""), &counts(&[(1, 95)], 0)), None);
@@ -102,11 +102,8 @@ mod tests {
         let counts = counts(&[(1, 150), (2, 50)], 50);
         assert_eq!(unclear_returns(&options("surface = \"ground\""), &counts), None);
         for (text, words) in [
-            (
-                "surface = \"first\"",
-                "25 % of the points (50 of 200) do not say clearly which return of how many they are: one without",
-            ),
-            ("returns = \"last\"", "counts as the last"),
+            ("surface = \"first\"", "25 % of the points (50 of 200) have no valid return number: they are"),
+            ("returns = \"last\"", "last returns if"),
             ("returns = [2]", "number 1"),
         ] {
             let warning = unclear_returns(&options(text), &counts).unwrap();

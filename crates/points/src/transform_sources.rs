@@ -149,7 +149,8 @@ fn common_heights(
     }
     if let (Some((other, known)), Some(first)) = (&common, silent.first()) {
         warnings.push(format!(
-            "{} of {} inputs do not say what their heights count from, such as {}: they are taken to count from {}, as {other} says",
+            "{} of {} inputs have no vertical datum, such as {}: {} assumed, as in {other}; fix: [input] crs with a vertical part, if \
+             that is wrong",
             silent.len(),
             sources.len(),
             first.path.display(),

@@ -7,7 +7,7 @@ use crs::choice::CrsChoice;
 use crs::system::{Crs, CrsKind};
 use crs::transform::between::{CrsTransform, DatumNote};
 use rust_decimal::prelude::ToPrimitive;
-use sys::Warnings;
+use sys::{Warnings, of_inputs};
 
 /// Metres of a degree of latitude, about.
 const DEGREE: f64 = 111_200.0;
@@ -28,11 +28,9 @@ pub(crate) fn warn_of_overruled(sources: &[Source], said: &[Crs], options: &Inpu
     let others: Vec<_> = all().filter(|pair| !differences(*pair).is_empty()).collect();
     if let Some((first, crs)) = others.first() {
         warnings.push(format!(
-            "[input] crs takes all inputs as {}, though {} of {} say otherwise, such as {}: {} differs in {}",
+            "{}[input] crs ({}) overrides its CRS: {} differs in {}; fix: leave [input] crs out, if the file is right",
+            of_inputs(others.len(), sources.len(), &first.path),
             crs.label(),
-            others.len(),
-            sources.len(),
-            first.path.display(),
             if first.crs.is_named() { first.crs.label() } else { "it".to_string() },
             crs.differences(&first.crs).join(" and ")
         ));
@@ -51,7 +49,7 @@ pub(crate) fn warn_of_lengths(sources: &[Source], said: &[Crs], options: &InputO
     let others: Vec<_> = sources.iter().zip(said).filter(|(source, crs)| is_other(source, crs)).collect();
     if let Some((first, crs)) = others.first() {
         warnings.push(format!(
-            "{}x and y are taken as longitude and latitude ({}), though {} says that their unit is the {}",
+            "{}x and y are taken as longitude and latitude ({}), though the columns of {} name the unit {}",
             of_all(others.len(), sources.len()),
             crs.label(),
             first.path.display(),
@@ -66,11 +64,9 @@ pub(crate) fn warn_of_heights(sources: &[Source], said: &[Crs], warnings: &mut W
     let silent: Vec<&Source> = sources.iter().zip(said).filter(|(_, crs)| is_silent(crs)).map(|pair| pair.0).collect();
     if let Some(first) = silent.first() {
         warnings.push(format!(
-            "{} of {} inputs are in degrees and do not say the unit of their heights, such as {}: it is taken to be the metre (name a CRS \
-             of heights to say otherwise, such as 6360 in \"EPSG:4269+6360\")",
-            silent.len(),
-            sources.len(),
-            first.path.display()
+            "{}its heights have no unit: metres assumed; fix: a CRS with a vertical part, such as [input] crs = \"EPSG:4269+6360\" for \
+             US survey feet, if that is wrong",
+            of_inputs(silent.len(), sources.len(), &first.path)
         ));
     }
 }
@@ -84,7 +80,7 @@ pub(crate) fn warn_of_coarse_degrees(sources: &[Source], said: &[Crs], warnings:
         sources.iter().zip(said).filter(|(source, crs)| is_coarse(source, crs)).map(|pair| pair.0).collect();
     if let Some(first) = coarse.first() {
         warnings.push(format!(
-            "{}the degrees of {} have steps of {}, which are about {:.1} m on the ground: the points lie on so coarse a grid",
+            "{}the degrees of {} are rounded to {}, about {:.1} m on the ground",
             of_all(coarse.len(), sources.len()),
             first.path.display(),
             first.own_coordinates().axes[0].scale,
@@ -101,18 +97,16 @@ pub(crate) fn warn_of_datums(sources: &[Source], notes: &[DatumNote], warnings: 
     let alike = all(&|note| if let DatumNote::TakenAlike(names) = note { Some(names.clone()) } else { None });
     if let Some((first, names)) = alike.first() {
         warnings.push(format!(
-            "{}{}: [input] datums = \"close\" takes {names} for one datum; they may be a metre or two apart",
-            such_as(alike.len(), sources.len()),
-            first.path.display()
+            "{}no datum shift between {names}, which may be a metre or two apart ([input] datums = \"close\")",
+            of_inputs(alike.len(), sources.len(), &first.path)
         ));
     }
     let assumed = all(&|note| if let DatumNote::Assumed(names) = note { Some(names.clone()) } else { None });
     if let Some((first, names)) = assumed.first() {
         warnings.push(format!(
-            "{}{}: it does not name its datum, and {names} are assumed to be one; two datums may be hundreds of metres apart (say with \
-             [input] crs what all files are in)",
-            such_as(assumed.len(), sources.len()),
-            first.path.display()
+            "{}its datum is unknown, and {names} are assumed to be one; fix: [input] crs, because two datums may be hundreds of metres \
+             apart",
+            of_inputs(assumed.len(), sources.len(), &first.path)
         ));
     }
 }
@@ -126,8 +120,8 @@ pub(crate) fn warn_of_date_line(sources: &[Source], said: &[Crs], to: &Crs, warn
         sources.iter().zip(said).filter(|(source, crs)| is_around_the_earth(source, crs)).map(|pair| pair.0).collect();
     if let Some(first) = wide.first().filter(|_| is_cut_there) {
         warnings.push(format!(
-            "{}the longitudes of {} reach around more than half of the earth: if its points lie on both sides of the date line, they are at \
-             both ends of {}, and the mesh spans all of it (name a CRS whose central meridian is near them)",
+            "{}the longitudes of {} span more than half of the earth: points on both sides of the date line lie at both ends of {}; \
+             fix: [input] to_crs with a central meridian near them",
             of_all(wide.len(), sources.len()),
             first.path.display(),
             to.label()
@@ -149,8 +143,7 @@ pub(crate) fn warn_of_scale(sources: &[Source], to: &Crs, warnings: &mut Warning
     let is_true = |ground: &f64| (ground - 1.0).abs() <= TRUE_TO_SCALE;
     let Some(ground) = scales.get(scales.len() / 2).filter(|_| !scales.iter().any(is_true)) else { return };
     warnings.push(format!(
-        "[input] to_crs ({}) is not true to scale here: a metre of it is about {ground:.2} m on the ground, so lengths and slopes of the \
-         mesh are wrong by that (name another CRS, such as \"utm\")",
+        "[input] to_crs ({}) distorts lengths here: a metre of it is about {ground:.2} m on the ground; fix: [input] to_crs = \"utm\"",
         to.label()
     ));
 }
@@ -178,8 +171,4 @@ fn ground_of_metre(to: &Crs, [x, y]: [f64; 2]) -> Option<f64> {
 
 fn of_all(some: usize, all: usize) -> String {
     if all == 1 { String::new() } else { format!("{some} of {all} inputs: ") }
-}
-
-fn such_as(some: usize, all: usize) -> String {
-    if all == 1 { String::new() } else { format!("{some} of {all} inputs, such as ") }
 }

@@ -4,7 +4,7 @@ use crate::written::{WrittenDifference, short_name};
 use overlay::{FixedSum, Totals};
 use serde::Serialize;
 use std::fmt;
-use sys::Warnings;
+use sys::{ShownWarning, Warnings};
 use terrain::TerrainSystem;
 
 /// The difference of two terrains. Lengths are in metres, areas in square metres, volumes in cubic metres.
@@ -157,6 +157,6 @@ impl fmt::Display for Difference {
             self.rows(f, &area.figures)?;
         }
         self.written.iter().try_for_each(|written| write!(f, "{written}"))?;
-        self.warnings.iter().try_for_each(|warning| writeln!(f, "warning: {warning}"))
+        self.warnings.iter().try_for_each(|warning| writeln!(f, "{}", ShownWarning(warning)))
     }
 }

@@ -132,7 +132,6 @@ mod injection {
 mod injection {
     use std::io;
     use std::panic::Location;
-    use std::time::Duration;
 
     /// Nothing is ever due in this build.
     #[inline(always)]
@@ -155,7 +154,7 @@ mod injection {
     #[cfg(feature = "remote")]
     /// The usual time.
     #[inline(always)]
-    pub fn network_timeout() -> Option<Duration> {
+    pub fn network_timeout() -> Option<std::time::Duration> {
         None
     }
 

@@ -17,7 +17,7 @@ pub mod threads;
 mod warnings;
 
 pub use error::{Error, ErrorKind, Result};
-pub use warnings::{ShownWarning, Warnings};
+pub use warnings::{ShownWarning, Warnings, of_inputs, with_remedy_below};
 
 /// Writes a message to standard error, as a terminal can show it. A closed or full standard error must not end the job, so failures are ignored.
 pub fn say(text: &str) {

@@ -12,12 +12,40 @@ const FIX: &str = "; fix: ";
 #[derive(Clone, Copy, Debug)]
 pub struct ShownWarning<'a>(pub &'a str);
 
+impl<'a> ShownWarning<'a> {
+    /// Returns what it is, without the remedy.
+    pub fn what(self) -> &'a str {
+        self.parts().0
+    }
+
+    fn parts(self) -> (&'a str, Option<&'a str>) {
+        self.0.rsplit_once(FIX).map_or((self.0, None), |(what, fix)| (what, Some(fix)))
+    }
+}
+
 impl fmt::Display for ShownWarning<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0.rsplit_once(FIX) {
-            Some((what, fix)) => write!(f, "warning: {}\n  fix: {}", one_line(what), one_line(fix)),
-            None => write!(f, "warning: {}", one_line(self.0)),
+        match self.parts() {
+            (what, Some(fix)) => write!(f, "warning: {}\n  fix: {}", one_line(what), one_line(fix)),
+            (what, None) => write!(f, "warning: {}", one_line(what)),
         }
+    }
+}
+
+/// Returns how a warning about `some` of `all` inputs begins: with the `first` of them.
+pub fn of_inputs(some: usize, all: usize, first: &Path) -> String {
+    if all == 1 {
+        format!("{}: ", first.display())
+    } else {
+        format!("{some} of {all} inputs, such as {}: ", first.display())
+    }
+}
+
+/// Returns an error as people see it: what is wrong, and, on a line of its own, what to do about it, if it says so.
+pub fn with_remedy_below(error: &str) -> String {
+    match error.rsplit_once(FIX) {
+        Some((what, fix)) => format!("{what}\n  fix: {fix}"),
+        None => error.into(),
     }
 }
 
@@ -86,5 +114,9 @@ mod tests {
     fn a_remedy_has_a_line_of_its_own() {
         assert_eq!(ShownWarning("unit unknown; fix: set\nit").to_string(), "warning: unit unknown\n  fix: set\\nit");
         assert_eq!(ShownWarning("rounded").to_string(), "warning: rounded");
+        assert_eq!(with_remedy_below("line 2:\n  a; fix: b"), "line 2:\n  a\n  fix: b");
+        assert_eq!(with_remedy_below("gone"), "gone");
+        assert_eq!(of_inputs(1, 1, Path::new("a.laz")), "a.laz: ");
+        assert_eq!(of_inputs(1, 2, Path::new("a.laz")), "1 of 2 inputs, such as a.laz: ");
     }
 }

@@ -93,7 +93,7 @@ pub fn same_system(
         (Some(_), Some(_)) => match first.crs.sameness(&second.crs) {
             Sameness::Known => {}
             Sameness::Assumed => warnings.push(format!(
-                "not both datums are named: {} are assumed to be one; two datums may be hundreds of metres apart",
+                "a datum is unknown: {} are assumed to be one, though two datums may be hundreds of metres apart",
                 first.crs.names_of_datums(&second.crs)
             )),
             Sameness::Refuted(why) => return refuse(&why),
@@ -109,7 +109,7 @@ pub fn same_system(
 }
 
 fn unknown(name: &str, what: &str, other: &str) -> String {
-    format!("the {what} of {name} is unknown: it is assumed to be that of the other terrain, {other}")
+    format!("the {what} of {name} is unknown: {other} assumed, as for the other terrain")
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use crate::clip::ClipArea;
 use crate::keyed_records::{KeyedRecord, KeyedRecords};
 use crate::report::ReportedFacts;
 use crate::surface::{Bound, Surface, SurfaceProof};
+use crate::watcher::Watcher;
 use delaunay::geometry::Site;
 use ground::{CoveredArea, Ground, LowestHeights, PointCollector, Scale};
 use lattice::{AxisMap, Lattice, shortest_decimal};
@@ -104,6 +105,7 @@ pub(super) struct Inputs<'a> {
     files: &'a [PathBuf],
     /// The area that the job kept points in; `None` for everywhere.
     clip: Option<ClipArea>,
+    watcher: &'a dyn Watcher,
 }
 
 impl<'a> Inputs<'a> {
@@ -111,7 +113,12 @@ impl<'a> Inputs<'a> {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Input`] if one cannot be read.
-    pub(super) fn open(files: &'a [PathBuf], facts: &'a ReportedFacts, extras: &Extras) -> Result<Inputs<'a>> {
+    pub(super) fn open(
+        files: &'a [PathBuf],
+        facts: &'a ReportedFacts,
+        extras: &Extras,
+        watcher: &'a dyn Watcher,
+    ) -> Result<Inputs<'a>> {
         let reading = facts.texts.unwrap_or(TextReading { colors: true, ..TextReading::default() });
         let (text, choice) = match &facts.input {
             Some(input) => (input.csv.clone(), input.row_choice(reading.fields())),
@@ -150,7 +157,7 @@ impl<'a> Inputs<'a> {
             vertical: extras.resolution_z * extras.metres_per_unit_z,
         };
         let clip = clip_area(facts, &lattice)?;
-        Ok(Inputs { facts, lattice, scale, sources, files, clip })
+        Ok(Inputs { facts, lattice, scale, sources, files, clip, watcher })
     }
 
     /// Compares the vertices in `places` with the points of the inputs, and with the ends of the edges along breaklines. Points that are no
@@ -170,6 +177,7 @@ impl<'a> Inputs<'a> {
         let is_ground_unknown = self.wants_ground() && lines.is_some();
         let surface = surface.filter(|_| !is_ground_unknown);
         let ground = (self.wants_ground() && !is_ground_unknown).then(|| self.find_ground()).transpose()?;
+        self.begin("read inputs");
         self.each_chunk(&|number, decode| {
             decode(&mut |points| match &ground {
                 None => places.add_points(number, points),
@@ -221,7 +229,9 @@ impl<'a> Inputs<'a> {
 
     /// Finds the ground anew, as the job did.
     fn find_ground(&self) -> Result<Ground> {
+        self.begin("find area");
         let area = self.collect(CoveredArea::new(self.scale))?;
+        self.begin("find ground");
         let lowest = self.collect(LowestHeights::new(&area))?;
         let sizes = self.facts.input.as_ref().map(|input| input.bare_earth).unwrap_or_default();
         Ground::find(&lowest, sizes, interrupt::check)
@@ -242,6 +252,11 @@ impl<'a> Inputs<'a> {
         Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
+    /// Tells that all points of the inputs are read for a step.
+    fn begin(&self, step: &'static str) {
+        self.watcher.begin(step, self.sources.iter().map(|source| source.records).sum(), "points");
+    }
+
     /// Calls `take` for each chunk of the inputs, with the number of the input and with what decodes the points that the job wanted, on all threads.
     fn each_chunk(&self, take: &(dyn Fn(u32, &DecodeChunk) -> Result<()> + Sync)) -> Result<()> {
         let mut first_order = 0;
@@ -258,7 +273,8 @@ impl<'a> Inputs<'a> {
                             sink(&points.iter().filter(is_inside).copied().collect::<Vec<_>>())
                         }
                     };
-                    source.decode(chunk, &rules, within).map(drop)
+                    self.watcher.advance(source.decode(chunk, &rules, within)?.read);
+                    Ok(())
                 })
             })?;
             first_order += source.records;

@@ -88,6 +88,7 @@ mod report;
 mod surface;
 mod tile_files;
 mod verdict;
+mod watcher;
 mod written_files;
 
 use std::path::{Path, PathBuf};
@@ -99,6 +100,7 @@ use rayon::prelude::*;
 pub use digest::{Digest, digest_of};
 pub use terrain::{Error, Result, SourceGrid, SourceGridError};
 pub use verdict::{Conclusion, Verdict};
+pub use watcher::Watcher;
 
 use crate::border_matching::Borders;
 use crate::breaklines::{BreaklineEdges, CheckedBreaklines};
@@ -110,6 +112,7 @@ use crate::report::ReadReport;
 use crate::surface::Surface;
 use crate::tile_files::TileFiles;
 use crate::verdict::CheckedMesh;
+use crate::watcher::Unwatched;
 use crate::written_files::WrittenFiles;
 use sys::address_space;
 use terrain::refuse_unfinished;
@@ -129,6 +132,14 @@ pub fn verify(directory: &Path, memory: u64) -> Result<Verdict> {
 /// # Errors
 /// As [`verify`], and [`sys::Error::Io`] or [`sys::Error::Input`] if an input cannot be read.
 pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Result<Verdict> {
+    verify_watched(directory, memory, inputs, &Unwatched)
+}
+
+/// As [`verify_against`]; tells `watcher` how far it is.
+///
+/// # Errors
+/// As [`verify_against`].
+pub fn verify_watched(directory: &Path, memory: u64, inputs: &[PathBuf], watcher: &dyn Watcher) -> Result<Verdict> {
     let memory = address_space::at_start().map_or(memory, |left| memory.min(left.bytes));
     refuse_unfinished(directory)?;
     let found = TileFiles::find(directory);
@@ -136,7 +147,7 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
         return Err(error.into());
     }
     let report = ReadReport::read(directory);
-    let written = WrittenFiles::check(directory, report.facts.file_list);
+    let written = WrittenFiles::check(directory, report.facts.file_list, watcher);
     let unusable = |what: String| Ok(Verdict::without_mesh(what, &report, &written));
     let files = match found {
         Ok(files) => files,
@@ -153,7 +164,7 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
     };
     let inputs = match inputs {
         [] => None,
-        inputs => Some(Inputs::open(inputs, &report.facts, &files.extras)?),
+        inputs => Some(Inputs::open(inputs, &report.facts, &files.extras, watcher)?),
     };
     let lattice = || lattice_of(&report.facts, &files.extras);
     let lines = BreaklineEdges::read(directory, lattice, memory / 4)?;
@@ -166,7 +177,9 @@ pub fn verify_against(directory: &Path, memory: u64, inputs: &[PathBuf]) -> Resu
         files: &files,
         grid: &grid,
         next: AtomicUsize::new(0),
+        watcher,
     };
+    watcher.begin("check tiles", files.paths.len() as u64, "tiles");
     let lanes = files.lanes(memory / 2)?;
     let findings =
         (0..lanes).into_par_iter().map(|_| run.check_files()).try_reduce(Findings::default, |a, b| Ok(a.merge(b)))?;
@@ -192,6 +205,7 @@ struct Verification<'a> {
     surface: Option<Surface>,
     /// The number of the next file to check.
     next: AtomicUsize,
+    watcher: &'a dyn Watcher,
 }
 
 impl Verification<'_> {
@@ -208,6 +222,7 @@ impl Verification<'_> {
                 }
                 Err(error) => return Err(error),
             }
+            self.watcher.advance(1);
         }
     }
 

@@ -7,6 +7,7 @@ use std::path::{Component, Path};
 use rayon::prelude::*;
 
 use crate::file_search::files_below;
+use crate::watcher::Watcher;
 use tiles::checksums::{Checksum, parse_list, read_file};
 use tiles::file_names::OutputFiles;
 
@@ -36,7 +37,7 @@ enum State {
 
 impl WrittenFiles {
     /// Compares the files in the output `directory` of a job with its list. `expected` is the checksum of the list, if the report says it.
-    pub(super) fn check(directory: &Path, expected: Option<Checksum>) -> WrittenFiles {
+    pub(super) fn check(directory: &Path, expected: Option<Checksum>, watcher: &dyn Watcher) -> WrittenFiles {
         let output = OutputFiles::new(directory);
         let path = output.checksums();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -50,7 +51,9 @@ impl WrittenFiles {
         };
         let files = parse_list(&text).filter(|files| files.iter().all(|(name, _)| is_inside(name)));
         match files {
-            Some(files) if expected.is_none_or(|expected| expected == Checksum::of(&text)) => compare(&output, &files),
+            Some(files) if expected.is_none_or(|expected| expected == Checksum::of(&text)) => {
+                compare(&output, &files, watcher)
+            }
             _ => WrittenFiles::failed(format!(
                 "{name}: it is not as the job wrote it, so that no file can be compared with it"
             )),
@@ -67,8 +70,14 @@ fn is_inside(name: &str) -> bool {
     Path::new(name).components().all(|part| matches!(part, Component::Normal(_)))
 }
 
-fn compare(output: &OutputFiles, files: &[(String, Checksum)]) -> WrittenFiles {
-    let states: Vec<State> = files.par_iter().map(|(name, wanted)| state(output, name, *wanted)).collect();
+fn compare(output: &OutputFiles, files: &[(String, Checksum)], watcher: &dyn Watcher) -> WrittenFiles {
+    watcher.begin("checksums", files.len() as u64, "files");
+    let state = |(name, wanted): &(String, Checksum)| {
+        let found = state(output, name, *wanted);
+        watcher.advance(1);
+        found
+    };
+    let states: Vec<State> = files.par_iter().map(state).collect();
     let (mut changed, mut gone) = (Vec::new(), Vec::new());
     let mut checked = WrittenFiles { has_list: true, ..WrittenFiles::default() };
     for ((name, _), state) in files.iter().zip(states) {

@@ -69,11 +69,14 @@ fn what_encloses_nothing_or_is_no_area_is_named() {
     let flat = vec![[40.0, 40.0], [60.0, 60.0], [80.0, 80.0]];
     let back = vec![SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[1]];
     for (rings, words) in [
-        (&[eight][..], "feature 1 is a lake whose outlines cross at (500070, 4000070)"),
-        (&[square.clone(), beyond], "feature 1 is a lake whose outlines cross at (500100, 40000"),
+        (&[eight][..], "feature 1 is a lake whose outlines cross, so water and land alternate at (500070, 4000070)"),
+        (
+            &[square.clone(), beyond],
+            "feature 1 is a lake whose outlines cross, so water and land alternate at (500100, 40000",
+        ),
         (
             &[square.clone(), BESIDE.to_vec()],
-            "feature 1 is a lake with a hole outside of its outline at (500110, 4000040)",
+            "feature 1 is a lake with a hole outside its outline, which is taken for water at (500110, 4000040)",
         ),
         (
             &[[&square[..], &[[40.0, 40.0], [70.0, 40.0]], &square[1..]].concat()],
@@ -92,7 +95,7 @@ fn what_encloses_nothing_or_is_no_area_is_named() {
         said.refused(3, &["lakes.geojson: feature 2 has a hole that is the same as its outline, at (500040, 4000040)"]);
     }
     let (said, _) = run(&survey, &[&[square], &[island]]);
-    assert!(said.out.contains("lie inside a lake"), "{}", said.out);
+    assert!(said.out.contains("inside a lake are left out"), "{}", said.out);
 }
 
 /// Of two heights at a vertex, the lake would take the lower one without a word.
@@ -118,5 +121,5 @@ fn a_ring_beside_the_only_outline_is_named() {
     let features = Features::areas(&[("lake", vec![clockwise(&SQUARE), other(&BESIDE)])]);
     let job = survey.job_with(&[shapefile(survey.folder(), "lakes", &features)], "kind = \"lake\"");
     let text = job.run_with(&["check"]).succeeded().out;
-    assert!(text.contains("a hole outside of its outline"), "{text}");
+    assert!(text.contains("a hole outside its outline"), "{text}");
 }

@@ -78,11 +78,11 @@ fn what_is_wrong_with_heights_is_said() {
     let (_survey, job) = with_doubtful_heights();
     let said = job.run().succeeded();
     for words in [
-        "1 river rises on its way down; the worst is feature 1 of",
+        "1 river rises downstream; the worst is feature 1 of",
         "by 0.5 at (500110, 4000010)",
         "1 lake is not flat",
         "0.3 higher at (500040, 4000080)",
-        "heights disagree at 1 places",
+        "heights disagree at 1 place where",
     ] {
         assert!(said.out.contains(words), "no {words:?} in {}", said.out);
     }

@@ -37,13 +37,13 @@ fn common_fields() -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
         ("header size beyond", 94, vec![0xff; 2], Refused(3, "the header ends at 65535")),
         ("points at 0", 96, vec![0; 4], Refused(3, "points begin at byte 0")),
         ("points beyond", 96, vec![0xff; 4], Refused(3, "points begin at byte 4294967295")),
-        ("points a byte late", 96, vec![], Refused(3, "1 of them are not there")),
+        ("points a byte late", 96, vec![], Refused(3, "1 is missing")),
         ("number of VLRs", 100, vec![0xff; 4], Read(COUNT, 0, "4294967295 variable length records, but only 0")),
         ("point format", 104, vec![11], Refused(3, "format 11")),
         ("point format 63", 104, vec![63], Refused(3, "format 63")),
         ("compression bit", 104, vec![], Refused(3, "no LASzip record")),
         ("record length 0", 105, vec![0; 2], Refused(3, "says a point record has 0 bytes")),
-        ("record length", 105, vec![0xff; 2], Refused(3, "none of them is there")),
+        ("record length", 105, vec![0xff; 2], Refused(3, "all are missing")),
         ("points by return", 111, vec![0xff; 20], nothing_wrong()),
         ("scale 0", 131, double(0.0), Refused(3, "scale of x")),
         ("scale negative", 139, double(-0.01), Refused(3, "scale of y")),
@@ -74,19 +74,24 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
     if minor >= 4 {
         fields.extend([
             ("EVLRs beyond", 235, vec![0xff; 12], Read(COUNT, 0, "4294967295 extended variable length records")),
-            ("EVLRs in the points", 235, [&400u64.to_le_bytes()[..], &[1, 0, 0, 0]].concat(), Refused(3, "there: ")),
+            ("EVLRs in the points", 235, [&400u64.to_le_bytes()[..], &[1, 0, 0, 0]].concat(), Refused(3, "missing: ")),
             ("64-bit count", 247, vec![0xff; 8], Refused(3, "18446744073709551615 points")),
             ("64-bit count of 2^40", 247, (1u64 << 40).to_le_bytes().to_vec(), Refused(2, "2^40")),
-            ("64-bit count too large", 247, 201u64.to_le_bytes().to_vec(), Refused(3, "holds 201 records, but 1 of")),
+            (
+                "64-bit count too large",
+                247,
+                201u64.to_le_bytes().to_vec(),
+                Refused(3, "holds 201 records, but 1 is missing"),
+            ),
             ("64-bit count too small", 247, 150u64.to_le_bytes().to_vec(), Read(150, 0, "")),
-            ("two counts", 107, vec![0xff; 4], Read(COUNT, 0, "two point counts differ")),
+            ("two counts", 107, vec![0xff; 4], Read(COUNT, 0, "two point counts")),
             ("no count", 247, vec![0; 8], Refused(3, "no point is left")),
             ("points by return", 255, vec![0xff; 120], Read(COUNT, 0, "")),
         ]);
     } else {
         fields.extend([
             ("count", 107, vec![0xff; 4], Refused(3, "holds 4294967295 records")),
-            ("count too large", 107, 201u32.to_le_bytes().to_vec(), Refused(3, "holds 201 records, but 1 of")),
+            ("count too large", 107, 201u32.to_le_bytes().to_vec(), Refused(3, "holds 201 records, but 1 is missing")),
             ("count too small", 107, 150u32.to_le_bytes().to_vec(), Read(150, 0, "")),
             ("no count", 107, vec![0; 4], Refused(3, "no point is left")),
         ]);
@@ -165,7 +170,7 @@ pub(super) fn records_and_cuts() -> Vec<Case> {
         case("nothing after the letters", ".las", b"LASF".to_vec(), Refused(3, "too short for a LAS header")),
         case("a header cut", ".las", plain[..226].to_vec(), Refused(3, "226 bytes of at least 227")),
         case("a header of 1.4 cut", ".las", sound(4).las()[..374].to_vec(), Refused(3, "LAS 1.4 has 375")),
-        case("a header alone", ".las", plain[..227].to_vec(), Refused(3, "200 records, but none of them is there")),
+        case("a header alone", ".las", plain[..227].to_vec(), Refused(3, "200 records, but all are missing")),
         case("a byte more", ".las", [&plain[..], &[0]].concat(), Read(COUNT, 0, "")),
         case("zeros", ".las", vec![0; 10_000], Refused(3, "LASF")),
         case("noise", ".las", (0..10_000u32).map(|i| ((i * i) >> 3) as u8).collect(), Refused(3, "LASF")),
@@ -175,7 +180,7 @@ pub(super) fn records_and_cuts() -> Vec<Case> {
         let cut = 227 + (plain.len() - 227) * eighth / 8 - 1;
         let missing = COUNT - ((cut - 227) / length) as u64;
         let name = format!("cut after {eighth} of 8");
-        cases.push(case(&name, ".las", plain[..cut].to_vec(), Refused(3, "there: ")));
+        cases.push(case(&name, ".las", plain[..cut].to_vec(), Refused(3, "missing: ")));
         cases.push(
             case(&name, ".las", plain[..cut].to_vec(), Read(COUNT, missing, "missing"))
                 .with("max_malformed_fraction = 1.0"),

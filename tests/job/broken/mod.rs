@@ -70,7 +70,8 @@ impl Case {
 
 impl Gives {
     fn difference(&self, said: &Said) -> Option<String> {
-        let sentences = said.err.trim_end().lines().count();
+        // A remedy has a line of its own.
+        let sentences = said.err.trim_end().lines().filter(|line| !line.starts_with("  fix: ")).count();
         match self {
             _ if said.code != 0 && (sentences != 1 || !said.err.starts_with("error: ")) => {
                 Some(format!("more than one sentence: {}", said.err))

@@ -64,21 +64,13 @@ pub(super) fn cases() -> Vec<Case> {
         ),
         ("PTX after a blank line", b"\n10\n20\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n".to_vec(), Refused(3, "is PTX")),
         ("not a number", rows_and("nan,1,2\n"), Refused(3, "line 6: column 1 (x) is \"nan\"")),
-        (
-            "fewer points than the first line promises",
-            [b"7\n", ROWS.as_bytes()].concat(),
-            Refused(3, "2 of them are not there"),
-        ),
+        ("fewer points than the first line promises", [b"7\n", ROWS.as_bytes()].concat(), Refused(3, "2 are missing")),
         (
             "fewer points than the first line promises, and names",
             [b"7\nx y z\n", ROWS.as_bytes()].concat(),
-            Refused(3, "2 of them are not there"),
+            Refused(3, "2 are missing"),
         ),
-        (
-            "more points than the first line promises",
-            [b"4\n", ROWS.as_bytes()].concat(),
-            Read(5, 0, "promises 4 points"),
-        ),
+        ("more points than the first line promises", [b"4\n", ROWS.as_bytes()].concat(), Read(5, 0, "gives 4 points")),
         ("a height of twenty digits", rows_and("1,1,12345678901234567890\n"), Refused(3, "column 3 (z)")),
         (
             "a comment that names other columns",
@@ -116,7 +108,7 @@ pub(super) fn cases() -> Vec<Case> {
         (
             "fewer points than a comment promises",
             rows_and("# 7 points exported\n"),
-            Read(5, 0, "promises 7 points, but the file has only 5"),
+            Read(5, 0, "gives 7 points, but the file has only 5"),
         ),
         (
             "a number of points beyond all numbers",

@@ -90,8 +90,8 @@ pub(crate) fn too_many_vertices(options: &JobOptions, selected: u64) -> Option<S
     let has_room = selected.saturating_mul(BYTES_PER_LISTED) <= working_memory(options) / 2;
     (!has_room).then(|| {
         format!(
-            "[output] max_error selects {} points or more, for which [limits] memory = \"{}\" has no room: set more memory or a greater \
-             max_error, or leave max_error out for a mesh of all points",
+            "[output] max_error selects {} points or more, too many for [limits] memory = \"{}\"; fix: more [limits] memory, or a \
+             greater [output] max_error; without it, the mesh has all points",
             grouped(selected),
             options.limits.memory
         )
@@ -103,8 +103,8 @@ fn too_many_cells(options: &JobOptions, cells: u64) -> Option<String> {
     let has_room = cells.saturating_mul(BYTES_PER_CELL) <= working_memory(options);
     (!has_room).then(|| {
         format!(
-            "surface = \"bare-earth\" needs memory for at least {} cells of the ground, more than [limits] memory = \"{}\" allows: set more, or leave \
-             out points that lie far from all others by [input] bounds",
+            "surface = \"bare-earth\" needs memory for at least {} cells of the ground, more than [limits] memory = \"{}\" allows; fix: \
+             more [limits] memory, or [input] bounds without points that lie far from all others",
             grouped(cells),
             options.limits.memory
         )

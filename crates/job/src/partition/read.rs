@@ -47,14 +47,14 @@ fn with_notes(input: &PlannedInput, plan: &Plan, mut summary: PointSummary) -> P
     let path = input.source.path.display();
     if counts.misplaced > 0 {
         counts.notes.push(format!(
-            "{path}: {} points lie elsewhere than its octree (COPC) says, so all of its points were read to find those within bounds",
+            "{path}: {} points lie outside their cell of its octree (COPC): all points were read, to find those within [input] bounds",
             counts.misplaced
         ));
     }
     counts.notes.extend(heights.map(|what| format!("{path}: {what}")));
     counts
         .notes
-        .extend(no_ground(&plan.options.input, counts).map(|what| format!("{path}: no point is left of it: {what}")));
+        .extend(no_ground(&plan.options.input, counts).map(|what| format!("{path}: no point of it is used: {what}")));
     summary
 }
 

@@ -12,7 +12,7 @@ use points::Source;
 use points::options::{InputOptions, OutsideCrsArea};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
-use sys::Warnings;
+use sys::{Warnings, of_inputs};
 
 /// Surveys and zones reach some hundred kilometres beyond the area of use. Farther out, in degrees of arc, there is a warning.
 const DOUBTFUL: f64 = 3.0;
@@ -40,8 +40,7 @@ const FALSE_ORIGIN: f64 = 100_000.0;
 const OPEN_SEA: f64 = 1_000.0;
 
 /// What to do about points that may be right.
-const NOTHING_TO_DO: &str = ". If the CRS and the coordinates are right, there is nothing to do: [input] outside_crs_area stops a job only \
-    for points more than 670 km outside, or exchanged ones";
+const NOTHING_TO_DO: &str = ". Nothing, if the CRS and the coordinates are right";
 
 /// Kilometres of a degree of arc.
 const DEGREE: f64 = 111.2;
@@ -88,13 +87,10 @@ pub(crate) fn check_places(
         refuse_hopeless(&outside, is_assumed)?;
     }
     if let Some((source, first)) = outside.first() {
-        let count = match sources.len() {
-            1 => String::new(),
-            all => format!("{} of {all} inputs, such as ", outside.len()),
-        };
+        let of = of_inputs(outside.len(), sources.len(), &source.path);
         let nothing = if first.is_hopeless() || first.is_local { "" } else { NOTHING_TO_DO };
         let sentence = first.sentence(source, is_assumed(source));
-        warnings.push(format!("{count}{}: {sentence}{nothing}", source.path.display()));
+        warnings.push(format!("{of}{sentence}{nothing}"));
     }
     Ok(())
 }
@@ -114,7 +110,7 @@ fn warn_of_long_turns(places: &[(&Source, Vec<[f64; 2]>)], warnings: &mut Warnin
     };
     if let Some((source, [west, east])) = places.iter().find_map(|(source, _)| Some((source, beyond(source)?))) {
         warnings.push(format!(
-            "{}: its longitudes, from {west} to {east}, lie beyond 180 degrees, and whole turns are taken away: from {:.4} to {:.4}",
+            "{}: its longitudes ({west} to {east}) lie beyond 180 degrees, and are taken as {:.4} to {:.4}",
             source.path.display(),
             turned(west),
             turned(east)
@@ -363,9 +359,9 @@ impl Outside {
     fn sentence(&self, source: &Source, is_assumed: bool) -> String {
         let [x, y] = self.place;
         let lie = match self.degrees {
-            Some(_) if self.beyond == [0.0; 2] => "lie in an open sea, at longitude and latitude zero".into(),
+            Some(_) if self.beyond == [0.0; 2] => "lie in the sea at longitude 0, latitude 0".into(),
             Some([longitude, latitude]) => format!(
-                "lie at longitude {:.2} and latitude {latitude:.2}, about {:.0} km outside its area of use ({})",
+                "lie at longitude {:.2}, latitude {latitude:.2}, about {:.0} km outside its area of use ({})",
                 turned(longitude),
                 arc(self.beyond) * DEGREE,
                 self.area
@@ -375,10 +371,10 @@ impl Outside {
         let contradiction = self.crs.difference_to_code();
         let contradiction =
             contradiction.map_or_else(String::new, |what| format!(", whose text and code differ in {what}"));
-        let assumed = if is_assumed { "it names no CRS, and is taken to be in that of the other files: " } else { "" };
+        let assumed = if is_assumed { "it has no CRS, and that of the other files is assumed: " } else { "" };
         let what_to_do = if is_assumed { self.what_to_do_without_crs(source) } else { self.what_to_do(source) };
         format!(
-            "{assumed}in {}{contradiction}, its points (around x {x:.2}, y {y:.2}) {lie}. {what_to_do}",
+            "{assumed}in {}{contradiction}, its points (around x {x:.2}, y {y:.2}) {lie}; fix: {what_to_do}",
             self.crs.label()
         )
     }
@@ -394,26 +390,24 @@ impl Outside {
     fn what_to_do(&self, source: &Source) -> String {
         let is_angle = self.place[0].abs() <= 360.0 && self.place[1].abs() <= 90.0;
         if source.looks_geocentric() {
-            return format!("As geocentric coordinates, they lie on the surface of the earth. {TRANSFORM}");
+            return format!("they look geocentric: {TRANSFORM}");
         }
         match &self.change {
             Some(change) => change.cure(source.format),
             None if self.is_local => {
-                "They lie near the origin of its coordinates, as those of a site's own grid do: if they are one, set [input] crs = \"none\". If \
-                 the CRS and the coordinates are right, there is nothing to do"
+                "[input] crs = \"none\" for a local grid. Nothing, if the CRS and the coordinates are right"
                     .into()
             }
             None if self.is_target => {
-                "Name a CRS that is made for their place with [input] to_crs, such as to_crs = \"utm\"".into()
+                "[input] to_crs = \"utm\", or another CRS for their place".into()
             }
             None if is_angle => {
-                "If they are longitude and latitude, [input] crs = \"EPSG:4326\" says so, and to_crs = \"utm\" transforms them; if they are \
-                 a site's own grid, crs = \"none\" takes them as a plane"
+                "[input] crs = \"EPSG:4326\" and [input] to_crs = \"utm\" for longitude and latitude, [input] crs = \"none\" for a \
+                 local grid"
                     .into()
             }
             None => {
-                "Say with [input] crs = \"EPSG:...\" what the points are in, or with crs = \"none\" that they are a plane, which is placed \
-                 nowhere"
+                "[input] crs = \"EPSG:...\" if the record is wrong, [input] crs = \"none\" for a local grid"
                     .into()
             }
         }

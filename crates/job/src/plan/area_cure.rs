@@ -131,16 +131,16 @@ impl Change {
     /// what all files are in.
     pub(crate) fn cure_without_crs(&self, format: FileFormat, crs: &Crs) -> String {
         let what = match self {
-            Change::Degrees { exchanged: false } => "As longitude and latitude, they lie within it".into(),
-            Change::Unit(unit) => format!("In the unit {}, they lie within it", unit.name()),
+            Change::Degrees { exchanged: false } => "as longitude and latitude, they lie within it".into(),
+            Change::Unit(unit) => format!("in the unit {}, they lie within it", unit.name()),
             Change::Moved(by) => {
                 format!(
-                    "With {}, they lie within it: the number of a zone or a false origin is too much or missing",
+                    "with {}, they lie within it: the number of a zone or a false origin is too much or missing",
                     moved(*by)
                 )
             }
             Change::Southern(_, name) => {
-                format!("In the southern zone of the same number ({name}), they lie within its area")
+                format!("in the southern zone of the same number ({name}), they lie within its area")
             }
             Change::Degrees { .. }
             | Change::Exchanged
@@ -148,7 +148,7 @@ impl Change {
             | Change::Scaled(_)
             | Change::Negated(_) => return self.cure(format),
         };
-        format!("{what}. {}", name_missing_crs(self.code(crs), crs))
+        format!("{what}: {}", name_missing_crs(self.code(crs), crs))
     }
 
     /// Returns the code of the system that the points are in, if this change brings them into `crs`.
@@ -169,10 +169,10 @@ impl Change {
         let is_text = format == FileFormat::Text;
         match self {
             Change::Degrees { exchanged } => degrees(*exchanged, is_text),
-            Change::Exchanged => format!("With x and y exchanged, they lie within it: {}", exchange(is_text)),
-            Change::ExchangedNearBy => format!("With x and y exchanged, they lie near it: {}", exchange(is_text)),
+            Change::Exchanged => format!("with x and y exchanged, they lie within it: {}", exchange(is_text)),
+            Change::ExchangedNearBy => format!("with x and y exchanged, they lie near it: {}", exchange(is_text)),
             Change::Scaled(factor) => format!(
-                "Multiplied by {factor}, they lie beside those of the other files: {}, or leave the file out of [input] files",
+                "multiplied by {factor}, they lie beside those of the other files: {}, or leave the file out of [input] files",
                 if is_text {
                     "the decimal point or the unit of the file is wrong. Multiply its x, y and z first"
                 } else {
@@ -180,19 +180,19 @@ impl Change {
                 }
             ),
             Change::Unit(unit) => {
-                format!("In the unit {}, they lie within it: name a CRS in that unit with [input] crs", unit.name())
+                format!("in the unit {}, they lie within it: [input] crs with a CRS in that unit", unit.name())
             }
             Change::Moved(by) => format!(
-                "With {}, they lie within it: the number of a zone or a false origin is missing or too much. Name the CRS that counts as \
-                 the file does with [input] crs, or move the points first",
+                "with {}, they lie within it: a zone number or a false origin is missing or too much. Set [input] crs to the CRS with \
+                 that origin, or move the points first",
                 moved(*by)
             ),
             Change::Southern(code, name) => format!(
-                "With northings that count from 10000000 at the equator, as in the southern half of the earth, they lie in the southern zone \
-                 of the same number: set [input] crs = \"EPSG:{code}\" ({name})"
+                "with southern northings (10000000 at the equator), they lie in the southern zone of the same number: [input] crs = \
+                 \"EPSG:{code}\" ({name})"
             ),
             Change::Negated(signs) => format!(
-                "With the sign of {} changed, they lie within it: change it first, or say with [input] crs what the points are in",
+                "with the sign of {} changed, they lie within it: change it first, or set [input] crs",
                 match signs {
                     [true, true] => "x and y",
                     [true, false] => "x",
@@ -207,15 +207,14 @@ impl Change {
 pub(crate) fn name_missing_crs(code: Option<u32>, crs: &Crs) -> String {
     let [missing, common] = [code, crs.epsg].map(|code| code.map_or("EPSG:...".into(), |code| format!("EPSG:{code}")));
     format!(
-        "Name the CRS of the files without one with [input] missing_crs = \"{missing}\", together with to_crs = \"{common}\", which transforms \
-         them into that of the others"
+        "set [input] missing_crs = \"{missing}\" and [input] to_crs = \"{common}\", which transforms them into the CRS of the others"
     )
 }
 
 /// Says how x and y are exchanged.
 fn exchange(is_text: bool) -> &'static str {
     if is_text {
-        return "say with columns under [input.csv] which column is which, such as columns = [\"y\", \"x\", \"z\"]";
+        return "[input.csv] columns = [\"y\", \"x\", \"z\"]";
     }
     "exchange them first, for example with `pdal translate in.laz out.laz --writers.las.forward=scale --writers.las.offset_x=auto \
      --writers.las.offset_y=auto transformation --filters.transformation.matrix=\"0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1\"`"
@@ -225,12 +224,12 @@ fn exchange(is_text: bool) -> &'static str {
 fn degrees(exchanged: bool, is_text: bool) -> String {
     let order = match (exchanged, is_text) {
         (false, _) => "",
-        (true, true) => " Latitude comes first: say so with columns = [\"y\", \"x\", \"z\"] under [input.csv].",
+        (true, true) => " Latitude comes first: [input.csv] columns = [\"y\", \"x\", \"z\"].",
         (true, false) => " Latitude comes first: exchange x and y first.",
     };
     format!(
-        "As longitude and latitude, they lie within it: [input] crs = \"EPSG:4326\" says so, and to_crs = \"utm\" transforms them.{order} If \
-         they are a site's own grid, crs = \"none\" takes them as a plane"
+        "as longitude and latitude, they lie within it: [input] crs = \"EPSG:4326\" and [input] to_crs = \"utm\".{order} For a local \
+         grid, [input] crs = \"none\""
     )
 }
 

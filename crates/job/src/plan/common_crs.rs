@@ -5,7 +5,7 @@ use crs::{ComparableCrs, Crs, CrsChoice, Unit, same_length};
 use points::options::UnitChoice;
 use points::{FileFormat, Source};
 use std::borrow::Cow;
-use sys::{Error, Result, Warnings};
+use sys::{Error, Result, Warnings, of_inputs};
 
 /// Lengths of units that differ by less are two kinds of foot.
 const FEET_APART: f64 = 1e-5;
@@ -68,11 +68,9 @@ pub fn common_crs(sources: &[Source], choice: &CrsChoice, unit: UnitChoice, warn
         said.iter().map(|s| (s, crs.differences(&s.crs))).filter(|(_, found)| !found.is_empty()).collect();
     if let Some((first, differences)) = overruled.first() {
         warnings.push(format!(
-            "[input] crs takes all inputs as {}, though {} of {} say otherwise, such as {}: {} differs in {}",
+            "{}[input] crs ({}) overrides its CRS: {} differs in {}; fix: leave [input] crs out, if the file is right",
+            of_inputs(overruled.len(), sources.len(), &first.source.path),
             if crs.is_named() { crs.label() } else { format!("a plane in {}", crs.horizontal.name()) },
-            overruled.len(),
-            sources.len(),
-            first.source.path.display(),
             if first.crs.is_named() { first.crs.label() } else { "it".to_string() },
             differences.join(" and ")
         ));
@@ -100,8 +98,8 @@ fn add_units(crs: &mut Crs, said: &[StatedCrs], choice: &CrsChoice, warnings: &m
         crs.vertical = Some(metres);
         if matches!(choice, CrsChoice::Given { .. }) && crs.metres_per_unit() != crs.vertical {
             warnings.push(format!(
-                "[input] crs ({}) says no unit of heights: it is taken to be {}, as {} says (name a CRS of heights to say otherwise, such \
-                 as 5703 in \"EPSG:26915+5703\")",
+                "[input] crs ({}) has no unit of heights: {} assumed, as in {}; fix: a CRS with a vertical part, such as [input] crs = \
+                 \"EPSG:26915+5703\", if that is wrong",
                 crs.label(),
                 Unit::from_metres(Some(metres)).name(),
                 of.source.path.display()
@@ -169,7 +167,7 @@ fn agreed(said: &[StatedCrs], unit: UnitChoice, warnings: &mut Warnings) -> Resu
 fn warn_of_datums(without: Vec<&Source>, count: usize, datum: &str, warnings: &mut Warnings) {
     if let Some(first) = without.first() {
         warnings.push(format!(
-            "{} of {count} inputs do not say their datum, such as {}: it is taken to be {datum}, as in the others",
+            "{} of {count} inputs have no datum, such as {}: {datum} assumed, as in the others; fix: [input] crs, if that is wrong",
             without.len(),
             first.path.display()
         ));
@@ -215,7 +213,7 @@ fn warn_of_gaps(said: &[StatedCrs], crs: &Crs, unit: UnitChoice, warnings: &mut 
     let nameless: Vec<&StatedCrs> = said.iter().filter(|s| !s.crs.is_named()).collect();
     if let (true, Some(first)) = (crs.is_named(), nameless.first()) {
         warnings.push(format!(
-            "{} of {count} inputs name no CRS, such as {}: they are taken to be in {}, as the others are",
+            "{} of {count} inputs have no CRS, such as {}: {} assumed, as in the others; fix: [input] missing_crs, if that is wrong",
             nameless.len(),
             first.source.path.display(),
             crs.label()
@@ -226,7 +224,7 @@ fn warn_of_gaps(said: &[StatedCrs], crs: &Crs, unit: UnitChoice, warnings: &mut 
     let without: Vec<&StatedCrs> = said.iter().filter(lacks_unit).collect();
     if let (UnitChoice::Auto, Some(_), Some(first)) = (unit, crs.metres_per_unit(), without.first()) {
         warnings.push(format!(
-            "{} of {count} inputs do not say the unit of their coordinates, such as {}: it is taken to be {}, as in the others",
+            "{} of {count} inputs have no unit of length, such as {}: {} assumed, as in the others; fix: [input] unit, if that is wrong",
             without.len(),
             first.source.path.display(),
             crs.horizontal.name()
@@ -237,7 +235,8 @@ fn warn_of_gaps(said: &[StatedCrs], crs: &Crs, unit: UnitChoice, warnings: &mut 
     let silent: Vec<&StatedCrs> = said.iter().filter(|s| s.crs.vertical.is_none()).collect();
     if let Some(first) = silent.first() {
         warnings.push(format!(
-            "{} of {count} inputs do not say the unit of their heights, such as {}: it is taken to be {}, as in the others",
+            "{} of {count} inputs have no unit of heights, such as {}: {} assumed, as in the others; fix: [input] crs with a vertical \
+             part, such as \"EPSG:26915+5703\", if that is wrong",
             silent.len(),
             first.source.path.display(),
             Unit::from_metres(Some(metres)).name()
@@ -252,14 +251,14 @@ fn warn_of_depths(said: &[StatedCrs], crs: &Crs, warnings: &mut Warnings) {
     let downward: Vec<(&StatedCrs, String)> = said.iter().filter_map(|s| Some((s, s.crs.depths()?))).collect();
     let Some((first, doubt)) = downward.first() else { return };
     warnings.push(format!(
-        "{}{}: {doubt} (set [input] crs to say what is meant)",
-        if count == 1 { String::new() } else { format!("{} of {count} inputs, such as ", downward.len()) },
-        first.source.path.display()
+        "{}{doubt}, or set [input] crs, if the record is wrong",
+        of_inputs(downward.len(), count, &first.source.path)
     ));
     let silent: Vec<&StatedCrs> = said.iter().filter(|s| s.crs.vertical_system.is_none()).collect();
     if let (Some(_), Some(first)) = (crs.depths(), silent.first()) {
         warnings.push(format!(
-            "{} of {count} inputs do not say whether their z counts downwards, such as {}: it is taken to count as in the others",
+            "{} of {count} inputs do not state whether z is a height or a depth, such as {}: a depth assumed, as in the others; fix: \
+             [input] crs, if that is wrong",
             silent.len(),
             first.source.path.display()
         ));
@@ -280,12 +279,10 @@ fn warn_of_other_units(sources: &[Source], choice: &CrsChoice, chosen: Unit, war
     let others: Vec<&Source> = sources.iter().filter(is_other).collect();
     if let Some(first) = others.first() {
         warnings.push(format!(
-            "[input] unit takes coordinates to be in {}, though the {} of {} of {} inputs say otherwise, such as {}: {}",
+            "{}[input] unit ({}) overrides the unit of its {} ({})",
+            of_inputs(others.len(), sources.len(), &first.path),
             chosen.name(),
             if first.format == FileFormat::Text { "columns" } else { "records" },
-            others.len(),
-            sources.len(),
-            first.path.display(),
             first.crs.horizontal.name()
         ));
     }

@@ -111,8 +111,8 @@ pub(crate) fn farthest_file(sources: &[Source], extent: &Extent) -> Option<Strin
     let [x, y] = [0, 1].map(|axis| rounded([found[0][axis], found[1][axis]]));
     (4.0 * distance(found) >= 3.0 * size).then(|| {
         format!(
-            "the file farthest from the others is {} (x from {} to {}, y from {} to {}); if it is a mistake, leave it out of [input] files, or \
-             its points with [input] bounds",
+            "the file farthest from the others is {} (x {} to {}, y {} to {}); fix: leave it out of [input] files, or its points with \
+             [input] bounds, if it is a mistake",
             source.path.display(),
             x[0],
             x[1],

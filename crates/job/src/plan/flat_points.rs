@@ -25,9 +25,9 @@ pub(crate) fn flat_points(
     };
     let height = own_height(sources.first()?, lattice, steps.into());
     let is_text = sources.iter().any(|source| source.format == FileFormat::Text);
-    let column = if is_text { "choose the column of heights with `columns` under [input.csv], or " } else { "" };
+    let column = if is_text { "[input.csv] columns for the column of heights, or " } else { "" };
     Some(format!(
-        "{points} have the height {height}, so the terrain is flat: is the {} without heights? If so, {column}choose {} with heights",
+        "{points} have the height {height}, so the terrain is flat; fix: if the {} has no heights, {column}{} with heights",
         if sources.len() == 1 { "file" } else { "input" },
         if sources.len() == 1 { "another file" } else { "other files" }
     ))

@@ -66,14 +66,16 @@ impl FolderFiles {
         }
         if let Some(first) = texts.first().filter(|_| !laser.is_empty()) {
             let (texts, them) = some(texts.len(), first);
-            notes.push(format!("{texts} left out beside LAS and LAZ: name {them} to read {them} too"));
+            notes.push(format!(
+                "{texts} not read, because the folder has LAS or LAZ; fix: name {them} to read {them} too"
+            ));
         }
         let (clouds, others) = if laser.is_empty() { point_clouds(texts, text)? } else { (laser, Vec::new()) };
         if clouds.is_empty() {
             return Err(self.nothing_here(others.first()));
         }
-        notes.extend(others.iter().map(|why| format!("left out, because it is no point cloud: {why}")));
-        notes.extend(self.broken_clouds().map(|link| format!("left out: {}", leads_nowhere(link))));
+        notes.extend(others.iter().map(|why| format!("not read, because it is not a point cloud: {why}")));
+        notes.extend(self.broken_clouds().map(|link| format!("not read: {}", leads_nowhere(link))));
         Ok(FolderClouds { clouds, notes })
     }
 

@@ -4,7 +4,7 @@ use crate::plan::common_crs::TRANSFORM;
 use crs::{Crs, CrsChoice, CrsKind};
 use points::options::InputOptions;
 use points::{FileFormat, Source};
-use sys::{Error, Result, Warnings};
+use sys::{Error, Result, Warnings, of_inputs};
 
 /// Checks that no source is in a geocentric system, as its record or the user states.
 ///
@@ -71,10 +71,9 @@ pub(crate) fn warn_of_geocentric(sources: &[Source], options: &InputOptions, war
     let found: Vec<&Source> = sources.iter().filter(|source| source.looks_geocentric()).collect();
     if let Some(first) = found.first() {
         warnings.push(format!(
-            "{}{}: its coordinates look geocentric: x, y and z, around {:.0}, {:.0} and {:.0}, lie on the surface of the earth, and z is no \
-             height. {TRANSFORM}. If they are a plane, set [input] crs = \"none\"",
-            if sources.len() == 1 { String::new() } else { format!("{} of {} inputs, such as ", found.len(), sources.len()) },
-            first.path.display(),
+            "{}its coordinates (around {:.0}, {:.0}, {:.0}) look geocentric, so z is not a height; fix: {TRANSFORM}; [input] crs = \
+             \"none\" if x and y are a plane",
+            of_inputs(found.len(), sources.len(), &first.path),
             first.min[0],
             first.min[1],
             first.min[2]
@@ -93,10 +92,9 @@ pub(crate) fn warn_of_degrees(sources: &[Source], options: &InputOptions, warnin
     let found: Vec<&Source> = sources.iter().filter(is_meant).collect();
     if let Some(first) = found.first() {
         warnings.push(format!(
-            "{}{}: its x and y, from {} to {} and from {} to {}, look like longitude and latitude, and are taken as lengths. If they are \
-             degrees, set [input] crs = \"EPSG:4326\" and to_crs = \"utm\"; if they are a plane, set crs = \"none\"",
-            if sources.len() == 1 { String::new() } else { format!("{} of {} inputs, such as ", found.len(), sources.len()) },
-            first.path.display(),
+            "{}its x ({} to {}) and y ({} to {}) look like longitude and latitude, but are taken as lengths; fix: [input] crs = \
+             \"EPSG:4326\" and [input] to_crs = \"utm\" for degrees, [input] crs = \"none\" for a plane",
+            of_inputs(found.len(), sources.len(), &first.path),
             first.min[0],
             first.max[0],
             first.min[1],

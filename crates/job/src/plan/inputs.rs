@@ -23,6 +23,8 @@ pub struct NamedInputs {
     pub paths: Vec<PathBuf>,
     /// What the user should know about files of folders and of lists that were left out.
     pub notes: Vec<String>,
+    /// Files of lists that are not there, where bad files are to be left out.
+    pub skipped: Vec<SkippedInput>,
 }
 
 /// Returns the files that the options name. An entry that is a folder stands for the point clouds in it, and one that is a list for those that
@@ -35,7 +37,7 @@ pub fn named_inputs(options: &InputOptions) -> Result<NamedInputs> {
     for entry in &options.files {
         let entry_has = files_of_entry(entry, options)?;
         if entry_has.clouds.is_empty() {
-            return Err(Error::Config(format!("{FILES}: there is no file {entry}{}", hint_of_escape(entry))));
+            return Err(Error::Config(format!("{FILES}: there is no file {entry}{}", what_to_do_about(entry))));
         }
         notes.extend(entry_has.notes);
         for path in entry_has.clouds {
@@ -49,16 +51,16 @@ pub fn named_inputs(options: &InputOptions) -> Result<NamedInputs> {
         }
     }
     let (areas, mut known) = (ListedAreas::of(options, &lists), HashSet::new());
-    let mut named = NamedInputs { paths: Vec::new(), notes };
+    let mut named = NamedInputs { paths: Vec::new(), notes, skipped: Vec::new() };
     for found in found {
         let paths = match found {
             Named::Cloud(path) => vec![path],
-            Named::List(number) => named.wanted_of(&mut lists[number], &areas)?,
+            Named::List(number) => named.wanted_of(&mut lists[number], &areas, options.on_bad_file)?,
         };
         // Paths with a double slash are one path, and URLs are two.
         named.paths.extend(paths.into_iter().filter(|path| known.insert(place(path).into_os_string())));
     }
-    match (named.paths.is_empty(), lists.first()) {
+    match (named.paths.is_empty() && named.skipped.is_empty(), lists.first()) {
         (true, Some(list)) => Err(Error::Config(format!(
             "{FILES}: by {}, no point cloud of a list meets [input] bounds or clip: correct these, or the list",
             list.list.display()
@@ -75,30 +77,42 @@ enum Named {
 }
 
 impl NamedInputs {
-    /// Returns the clouds of a list that are opened, and notes how many are not.
+    /// Returns the clouds of a list that are opened, and notes which are not.
     ///
     /// # Errors
-    /// [`Error::Input`] if one of this machine is not there.
-    fn wanted_of(&mut self, list: &mut ListedInputs, areas: &ListedAreas) -> Result<Vec<PathBuf>> {
+    /// [`Error::Input`] if a local one is not there, and bad files are not to be left out.
+    fn wanted_of(
+        &mut self,
+        list: &mut ListedInputs,
+        areas: &ListedAreas,
+        on_bad_file: OnBadFile,
+    ) -> Result<Vec<PathBuf>> {
         let all = list.clouds.len();
         let (wanted, outside) = areas.wanted(std::mem::take(&mut list.clouds));
         if outside > 0 {
             self.notes.push(format!(
-                "{}: {outside} of its {all} files were not opened, because by the list they lie outside [input] bounds or clip",
+                "{}: {outside} of its {all} files lie outside [input] bounds or clip by the list, and were not opened",
                 list.list.display()
             ));
         }
-        let is_gone = |path: &&PathBuf| {
+        let is_gone = |path: &PathBuf| {
             let is_local = !path.to_str().is_some_and(is_url);
             is_local && path.metadata().is_err_and(|error| error.kind() == ErrorKind::NotFound)
         };
-        match wanted.iter().find(is_gone) {
-            Some(gone) => {
-                let what =
-                    format!("names {}, and there is no such file: correct the list, or copy the file", gone.display());
-                Err(Error::input(&list.list, what))
+        let (gone, there): (Vec<PathBuf>, Vec<PathBuf>) = wanted.into_iter().partition(is_gone);
+        match gone.first() {
+            Some(first) if on_bad_file == OnBadFile::Stop => Err(Error::input(
+                &list.list,
+                format!(
+                    "names {}, which does not exist; fix: correct the list, copy the file, or set [input] on_bad_file = \"skip\"",
+                    first.display()
+                ),
+            )),
+            _ => {
+                let why = format!("does not exist, but {} names it", list.list.display());
+                self.skipped.extend(gone.into_iter().map(|file| SkippedInput { file, why: why.clone() }));
+                Ok(there)
             }
-            None => Ok(wanted),
         }
     }
 }
@@ -125,11 +139,11 @@ fn files_of_entry(entry: &str, options: &InputOptions) -> Result<FolderClouds> {
     Ok(found)
 }
 
-/// Returns what to do if a path has a character that TOML has made of a backslash and a letter, as of `"C:\temp"`.
-fn hint_of_escape(entry: &str) -> &'static str {
+/// Returns what to do about a path that leads nowhere. TOML makes one character of a backslash and a letter, as of `"C:\temp"`.
+fn what_to_do_about(entry: &str) -> &'static str {
     match entry.contains(['\t', '\n', '\r', '\u{8}', '\u{c}', '\u{1b}']) {
-        true => ": a backslash has a meaning of its own in double quotes; write slashes, or single quotes",
-        false => "",
+        true => ": a backslash has a meaning of its own in double quotes; fix: write slashes, or single quotes",
+        false => "; fix: correct the path, which is relative to the configuration",
     }
 }
 
@@ -188,16 +202,15 @@ pub fn check_missing_records(sources: &[Source], options: &InputOptions) -> Resu
 fn missing_records(Source { records, missing, format, .. }: &Source) -> String {
     let start = format!("says that it holds {records} records, but");
     if missing < records {
+        let are = if *missing == 1 { "is" } else { "are" };
         return format!(
-            "{start} {missing} of them are not there: the file is cut off or its header is wrong. Copy it again, or raise [input] \
+            "{start} {missing} {are} missing: the file is cut off or its header is wrong; fix: copy it again, or raise [input] \
              max_malformed_fraction to use what is there"
         );
     }
     let why = match format {
-        FileFormat::Laz => {
-            "the file is cut off before the end of its first compressed chunk, which cannot be read in part"
-        }
+        FileFormat::Laz => "the file is cut off within its first compressed chunk",
         _ => "the file is cut off after its header, or its header is wrong",
     };
-    format!("{start} none of them is there: {why}. Copy it again, or leave it out with [input] on_bad_file = \"skip\"")
+    format!("{start} all are missing: {why}; fix: copy it again, or leave it out with [input] on_bad_file = \"skip\"")
 }

@@ -52,13 +52,15 @@ pub(crate) fn choose_lattice(
         let (step, finest) = (horizontal.step, horizontal.finest);
         let size = extent.size(0).max(extent.size(1));
         warnings.push(format!(
-            "x and y are rounded to {step}, the finest step that glTF's single precision allows over {size:.0} units; the inputs have {finest}"
+            "x and y are rounded to {step}, and the inputs have {finest}: glTF's single precision allows no finer step over {size:.0} \
+             units; fix: [input] bounds for a smaller area, if that is too coarse"
         ));
     }
     if vertical.step != vertical.finest {
         let (step, finest, size) = (vertical.step, vertical.finest, extent.size(2));
         warnings.push(format!(
-            "heights are rounded to {step}, the finest step that glTF's single precision allows over {size:.0} units; the inputs have {finest}"
+            "heights are rounded to {step}, and the inputs have {finest}: glTF's single precision allows no finer step over {size:.0} \
+             units; fix: [input] heights without stray points, if that is too coarse"
         ));
     }
     place(sources, extent, horizontal.step, vertical.step)

@@ -70,7 +70,8 @@ pub(crate) fn make_plan_on(
     refuse_contradicting_options(options)?;
     set_network_memory(network_memory(options));
     let named = named_inputs(&options.input)?;
-    let (sources, skipped) = open_all(&named.paths, &options.input, &row_choice(options))?;
+    let (sources, mut skipped) = open_all(&named.paths, &options.input, &row_choice(options))?;
+    skipped.extend(named.skipped);
     let mut plan = plan_sources(sources, skipped, options, (coarsening, known))?;
     let mut notes = Warnings::default();
     notes.extend(named.notes);
@@ -191,10 +192,12 @@ fn try_plan(
     if metres_z != metres {
         let other = match unit_choice {
             UnitChoice::Auto => "",
-            _ => ". [input] unit is that of x and y alone: the CRS or the columns state that of heights",
+            _ => {
+                "; fix: a CRS with a vertical part if the unit of heights is wrong: [input] unit sets that of x and y alone"
+            }
         };
         warnings.push(format!(
-            "heights are in another unit than x and y ({metres_z} m and {metres} m): glTF has both in metres, see metres_per_unit_z{other}"
+            "heights are in another unit than x and y ({metres_z} m and {metres} m): the tiles have all in metres{other}"
         ));
     }
     let frame = Frame::new(&lattice, metres, metres_z, crs.wkt.clone())?;
@@ -353,7 +356,7 @@ fn files_without_ground(sample: &HeightSample, options: &JobOptions) -> Option<S
         0 => String::new(),
         count => format!(" (and so for {count} other files)"),
     };
-    Some(format!("{}: no point is left of it{others}: {what}", path.display()))
+    Some(format!("{}: no point of it is used{others}: {what}", path.display()))
 }
 
 /// Returns the least and the greatest height that the sources claim, in steps of the lattice.

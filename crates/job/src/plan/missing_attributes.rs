@@ -19,9 +19,9 @@ fn missing_column<'a>(mut sources: impl Iterator<Item = &'a Source>, name: &str,
     let first = sources.next()?.path.display();
     let others = match sources.count() {
         0 => String::new(),
-        count => format!(", as have {count} others"),
+        count => format!(", as {count} others"),
     };
     Some(format!(
-        "{first} has no column of {name}{others}: its vertices have {instead}; if it has one, name it with `columns` under [input.csv]"
+        "{first} has no column of {name}{others}: its vertices have {instead}; fix: [input.csv] columns, if there is such a column"
     ))
 }

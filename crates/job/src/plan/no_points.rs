@@ -162,7 +162,8 @@ fn rounded(rectangle: Rectangle) -> String {
 fn compare(bounds: Rectangle, inputs: Rectangle, from_headers: bool) -> String {
     let hint = hint_of_exchange(bounds, inputs, "bounds are [xmin, ymin, xmax, ymax]");
     let by_headers = if from_headers { " by their headers" } else { "" };
-    format!("[input] bounds are {bounds:?}, and{by_headers} the inputs lie in {}{hint}", rounded(inputs))
+    let fix = if hint.is_empty() { "; fix: [input] bounds that meet this area" } else { "" };
+    format!("[input] bounds are {bounds:?}, and{by_headers} the inputs lie in {}{hint}{fix}", rounded(inputs))
 }
 
 fn meet(a: Rectangle, b: Rectangle) -> bool {

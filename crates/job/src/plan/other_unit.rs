@@ -4,7 +4,7 @@
 use crs::{Crs, CrsChoice, Unit, same_length};
 use points::options::InputOptions;
 use points::{FileFormat, Source};
-use sys::{Error, Result, Warnings};
+use sys::{Error, Result, Warnings, of_inputs};
 
 /// Checks that the unit of x and y that the user names is that of the system of every source.
 ///
@@ -100,11 +100,9 @@ pub(super) fn warn_of_dropped_units(
     let [plane, heights] = metres.map(name);
     let taken = if plane == heights { plane } else { format!("{plane}, and z in {heights}") };
     warnings.push(format!(
-        "[input] crs = \"none\" leaves records of coordinate systems aside, and the coordinates are taken in {taken}, though {} of {} inputs \
-         state another unit, such as {}: {what}. If the file is right, leave crs out, or set [input] unit to its unit",
-        others.len(),
-        sources.len(),
-        first.path.display()
+        "{}[input] crs = \"none\" ignores its unit ({what}): coordinates are taken to be in {taken}; fix: if the file is right, leave \
+         [input] crs out, or set [input] unit",
+        of_inputs(others.len(), sources.len(), &first.path)
     ));
 }
 

@@ -127,12 +127,12 @@ impl JobHeights<'_> {
         let source = out.next().filter(|_| self.sample.counts.kept > 0)?;
         let more = match out.count() {
             0 => String::new(),
-            1 => " (and so it is for 1 other file)".into(),
-            count => format!(" (and so it is for {count} other files)"),
+            1 => " (nor of 1 other file)".into(),
+            count => format!(" (nor of {count} other files)"),
         };
         Some(format!(
-            "{}: no point of a sample lies within [input] heights = [{low}, {high}]{more}: heights holds for all files, in the unit of each; \
-             widen it, or leave the file out of [input] files",
+            "{}: no point of a sample lies within [input] heights = [{low}, {high}]{more}; fix: wider [input] heights (in the unit of \
+             each file), or leave the file out of [input] files",
             source.path.display()
         ))
     }
@@ -205,7 +205,7 @@ impl JobHeights<'_> {
             [low, high] => format!("lie between {low} and {high}"),
         };
         Ok(format!(
-            "{}: {of}{}, far from all others, which {others}: they may be mistakes, or stand for nodata; {}",
+            "{}: {of}{}, far from all others, which {others}; fix: {}, if they are wrong or stand for nodata",
             source.path.display(),
             parts.join(", and "),
             self.remedy(source, found, kept)
@@ -225,8 +225,7 @@ impl JobHeights<'_> {
         match is_beside {
             true => format!("[input] heights = [{low}, {high}]{unit} leaves them out"),
             false => format!(
-                "remove them from the file: [input] heights holds for all files, whose heights lie between {low} and {high}{unit} \
-                 and leaves out none of them"
+                "remove them from the file ([input] heights holds for all files, which lie between {low} and {high}{unit})"
             ),
         }
     }
@@ -253,8 +252,8 @@ impl JobHeights<'_> {
         };
         let own = |end: usize| claim[end][2] / source.factor_of_heights();
         Some(format!(
-            "{}: all points have {}, far from those of the files around it{more}: they may be mistakes, or stand for nodata; \
-             leave them out with [input] heights = [{low}, {high}]{}, or the file out of [input] files",
+            "{}: all points have {}, far from those of the files around it{more}; fix: [input] heights = [{low}, {high}]{} leaves them \
+             out, if they are wrong or stand for nodata",
             source.path.display(),
             range_text([own(0), own(1)]),
             self.unit_of_each().trim_end_matches(',')
@@ -308,8 +307,8 @@ pub(crate) fn unforeseen_heights(source: &Source, read: Option<Bounds<3>>, plan:
     ]);
     (below || above).then(|| {
         format!(
-            "has heights from {} to {}, though nearly all points of a sample of all files lie between {lowest} and {highest}: some may be mistakes, or stand for \
-             nodata; [input] heights = [{lowest}, {highest}] leaves out what lies beyond",
+            "has heights from {} to {}, though nearly all points of a sample of all files lie between {lowest} and {highest}; fix: \
+             [input] heights = [{lowest}, {highest}], if those beyond are wrong or stand for nodata",
             own(min[2]),
             own(max[2])
         )

@@ -144,8 +144,8 @@ fn sentence(found: &SplitBoxes, first: Option<String>, is_sample: bool) -> Optio
     let others = if few == 1 { format!("1 point{first} stretches") } else { format!("{few} points{first} stretch") };
     Some(match is_wider {
         true => format!(
-            "{share} % {of} lie within {:.0} x {:.0} units; {others} the area to {:.0} x {:.0}: to leave them out, set [input] bounds = \
-             [{}, {}, {}, {}]",
+            "{share} % {of} lie within {:.0} x {:.0} units; {others} the area to {:.0} x {:.0}; fix: [input] bounds = [{}, {}, {}, {}] \
+             leaves them out",
             size(rest, 0),
             size(rest, 1),
             size(all, 0),
@@ -156,8 +156,8 @@ fn sentence(found: &SplitBoxes, first: Option<String>, is_sample: bool) -> Optio
             y[1]
         ),
         false => format!(
-            "{share} % {of} have heights from {} to {}; {others} the heights to {:.0} units, from {} to {}: [input] heights = \
-             [{}, {}] leaves them out",
+            "{share} % {of} have heights from {} to {}; {others} the heights to {:.0} units, from {} to {}; fix: [input] heights = [{}, \
+             {}] leaves them out",
             z[0],
             z[1],
             size(all, 2),
@@ -199,8 +199,8 @@ mod tests {
         assert!(!Hint::Few.is_worth_it(&benchmark));
         assert_eq!(
             sentence(&found(12, 5000.0), Some(" (the first is point 7 of a.las)".into()), false).unwrap(),
-            "99.98 % of the points lie within 80 x 70 units; 12 points (the first is point 7 of a.las) stretch the area to 5000 x 70: to leave them out, set [input] \
-             bounds = [0.0, 0.0, 80.0, 70.0]"
+            "99.98 % of the points lie within 80 x 70 units; 12 points (the first is point 7 of a.las) stretch the area to 5000 x 70; fix: [input] bounds = \
+             [0.0, 0.0, 80.0, 70.0] leaves them out"
         );
     }
 }

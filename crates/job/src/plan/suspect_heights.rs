@@ -85,8 +85,8 @@ fn doubt_about(
 fn of_doubt(SuspectHeight { height, others: [low, high] }: &SuspectHeight, record: &str) -> String {
     let value = shown_height(height.value);
     format!(
-        "{}, and all others lie between {low} and {high}: {value} may stand for nodata. Leave such points out with [input] nodata = {value}, or \
-         keep them with nodata = \"none\"",
+        "{}, and all others lie between {low} and {high}: {value} may stand for nodata; fix: [input] nodata = {value} leaves such \
+         points out, [input] nodata = \"none\" keeps them",
         who_has(height, record)
     )
 }
@@ -111,8 +111,8 @@ fn unannounced(source: &Source, height: f64) -> String {
     let value = shown_height(height.round());
     let [low, high] = [source.min[2], source.max[2]].map(|height| height / source.factor_of_heights());
     format!(
-        "has points of the height {value}, which stands for nodata, though its header gives heights from {low} to {high}. Leave such points \
-         out with [input] nodata = {value}, or keep them with nodata = \"none\""
+        "has points of the height {value}, which stands for nodata, though its header gives heights from {low} to {high}; fix: [input] \
+         nodata = {value} leaves such points out, [input] nodata = \"none\" keeps them"
     )
 }
 

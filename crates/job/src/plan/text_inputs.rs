@@ -51,9 +51,9 @@ pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Resu
     let is_open = is_silent || is_map && options.unit == UnitChoice::Auto;
     match sources.iter().find(is_in_degrees) {
         Some(source) if is_open => Err(Error::Config(format!(
-            "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), {}: [input] to_crs = \"utm\" with missing_crs = \
-             \"EPSG:4326\", if that is what they are in, transforms them to a projected CRS; if they are no degrees, set [input] crs = \
-             \"none\", and unit, for example to \"metre\"",
+            "{}: its columns are named as degrees (x from {} to {}, y from {} to {}{}), {}; fix: [input] to_crs = \"utm\" with \
+             missing_crs = \"EPSG:4326\" for longitude and latitude of WGS 84; [input] crs = \"none\" and unit, such as \"metre\", if \
+             they are not degrees",
             source.path.display(),
             source.min[0],
             source.max[0],
@@ -143,7 +143,7 @@ pub(crate) fn farthest_row(sources: &[Source], options: &JobOptions, extent: &Ex
     }
     let size = extent.size(0).max(extent.size(1)).max(extent.size(2));
     Ok(farthest.filter(|(distance, _)| 4.0 * distance >= 3.0 * size).map(|(_, row)| {
-        format!("the row farthest from the others is {row}; if it is a mistake, remove it or leave it out with [input] bounds")
+        format!("the row farthest from the others is {row}; fix: remove it, or leave it out with [input] bounds, if it is a mistake")
     }))
 }
 
@@ -164,7 +164,8 @@ pub fn stop_at<'a>(
     Error::input(
         &source.path,
         format!(
-            "{what}. Repair the file, leave it out (on_bad_file = \"skip\"), or raise max_malformed_fraction to read the rest"
+            "{what}; fix: copy or repair the file, leave it out with [input] on_bad_file = \"skip\", or raise [input] \
+             max_malformed_fraction to read the rest"
         ),
     )
 }

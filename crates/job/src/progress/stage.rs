@@ -3,7 +3,7 @@
 
 use crate::progress::activity::Activity;
 use crate::progress::clock::JobClock;
-use crate::progress::number_text::rough_time;
+use crate::progress::number_text::{grouped, rough_time};
 use crate::progress::stats::StageStats;
 use crate::progress::time_left::TimeLeft;
 use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
@@ -48,9 +48,10 @@ impl ProgressOutput {
         }
     }
 
-    /// Starts a stage of `total` `unit`s outside a job.
+    /// Starts a stage of `total` `unit`s outside a job. In a log, one that takes less than ten seconds leaves no line.
     pub fn stage(self, name: &'static str, total: u64, unit: &'static str) -> Stage {
-        JobProgress::new(self, JobClock::start(), Vec::new()).stage(name, total, unit)
+        let stage = JobProgress::new(self, JobClock::start(), Vec::new()).stage(name, total, unit);
+        Stage { of_job: false, ..stage }
     }
 }
 
@@ -89,13 +90,28 @@ impl JobProgress {
             _ => ProgressBar::hidden(),
         };
         let logged = Mutex::new(pace.start);
-        Stage { progress: self.progress, job: self.clock, own: JobClock::start(), unit, bar, pace, logged }
+        Stage {
+            progress: self.progress,
+            of_job: true,
+            job: self.clock,
+            own: JobClock::start(),
+            unit,
+            bar,
+            pace,
+            logged,
+        }
     }
 
     /// Starts one of several kinds of work that go on at the same time within a stage.
     pub fn activity(&self, name: &'static str, unit: &'static str) -> Activity {
         Activity::start(name, unit, self.clock)
     }
+}
+
+/// Returns the line of a log about a stage that is done. One of a single piece has no number.
+fn done_line(StageStats { stage, wall_s, done, unit, .. }: &StageStats, total: u64) -> String {
+    let amount = if total > 1 { format!(", {} {unit}", grouped(*done)) } else { String::new() };
+    format!("{stage}: done{amount} in {wall_s:.1} s")
 }
 
 /// How far a stage is, and how fast.
@@ -147,6 +163,7 @@ fn style(unit: &str, pace: Arc<StagePace>) -> ProgressStyle {
 /// A running stage. Any thread may call its methods.
 pub struct Stage {
     progress: ProgressOutput,
+    of_job: bool,
     job: JobClock,
     own: JobClock,
     unit: &'static str,
@@ -188,11 +205,9 @@ impl Stage {
             return self.say_json(done, false);
         }
         let percent = self.pace.share(&self.pace.done) * 100.0;
-        say(&format!(
-            "{name}: {percent:.0} % of {total} {}, {} left of the job",
-            self.unit,
-            rough_time(self.pace.left())
-        ));
+        let (total, left) = (grouped(total), rough_time(self.pace.left()));
+        let of = if self.of_job { " of the job" } else { "" };
+        say(&format!("{name}: {percent:.0} % of {total} {}, {left} left{of}", self.unit));
     }
 
     /// Prints how far the stage is, for programs.
@@ -226,9 +241,29 @@ impl Stage {
         if self.progress == ProgressOutput::Json {
             self.say_json(done, true);
         }
-        if self.progress == ProgressOutput::Lines {
-            say(&format!("{}: done, {} {} in {:.1} s", figures.stage, figures.done, self.unit, figures.wall_s));
+        let is_worth_a_line = self.of_job && self.pace.total > 0 || figures.wall_s >= LOG_INTERVAL.as_secs_f64();
+        if self.progress == ProgressOutput::Lines && is_worth_a_line {
+            say(&done_line(&figures, self.pace.total));
         }
         figures
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_a_log_has_the_amount_unless_it_is_one_piece() {
+        let stats = |done, unit: &str| StageStats {
+            stage: "levels".into(),
+            start_s: 0.0,
+            wall_s: 1.25,
+            cpu_s: 0.0,
+            done,
+            unit: unit.into(),
+        };
+        assert_eq!(done_line(&stats(12_345, "tiles"), 20_000), "levels: done, 12 345 tiles in 1.2 s");
+        assert_eq!(done_line(&stats(1, "job"), 1), "levels: done in 1.2 s");
     }
 }

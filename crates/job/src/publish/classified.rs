@@ -81,8 +81,8 @@ fn write_one(input: &PlannedInput, ground: &Ground, path: &Path) -> Result<Pendi
     let PlannedInput { source, .. } = input;
     let not_copied = match source.format {
         FileFormat::Las | FileFormat::Laz => None,
-        FileFormat::Text => Some("a text file has no classes; only LAS and LAZ files are copied"),
-        FileFormat::Ept => Some("an EPT has many files; only LAS and LAZ files are copied"),
+        FileFormat::Text => Some("only LAS and LAZ files are copied, and it is a text"),
+        FileFormat::Ept => Some("only LAS and LAZ files are copied, and it is an EPT"),
     };
     if let Some(what) = not_copied {
         return Err(Error::input(&source.path, what));

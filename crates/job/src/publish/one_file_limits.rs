@@ -16,7 +16,7 @@ pub(crate) fn fits_one_file(written: &TileStats) -> bool {
 /// Returns the warning for a terrain that does not fit the one file that the user wants.
 pub(crate) fn too_large_for_one_file(written: &TileStats) -> String {
     format!(
-        "{} triangles in {} tiles are more than viewers open as one file: tileset.json is written instead of terrain.glb; set {}",
+        "tileset.json is written instead of terrain.glb: {} triangles in {} tiles are more than viewers open as one file; fix: {}",
         grouped(written.triangles),
         grouped(written.files),
         match written.triangles > MAX_TRIANGLES_IN_ONE_FILE {

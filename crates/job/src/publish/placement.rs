@@ -36,8 +36,8 @@ pub(crate) struct Placement {
 }
 
 /// The warning about a geoid that is added to heights which need none.
-const ADDED_TWICE: &str = "the inputs say that heights count from the ellipsoid, and [output] height_offset adds the height of a geoid to them; \
-     leave it out, unless the inputs are wrong";
+const ADDED_TWICE: &str = "heights are above the ellipsoid by the inputs, and [output] height_offset adds a geoid to them; fix: leave \
+     [output] height_offset out, unless the inputs are wrong";
 
 /// Places `root`, and each tile below if need be. Tiles have positions by `frame`, and heights count from `geoid`.
 ///
@@ -108,29 +108,30 @@ fn lay(ground: &Ground, node: &mut TilesetNode) -> Result<f64, NotPlaced> {
 pub(crate) fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Option<String> {
     let placement = match placement {
         Err(why) => {
-            return Some(format!("tileset.json is not placed on the globe: {why}; its coordinates are local"));
+            return Some(format!(
+                "tileset.json is not placed on the globe, because {why}: its coordinates are local; fix: [input] crs = \
+             \"EPSG:...\""
+            ));
         }
         Ok(placement) => placement,
     };
     let off = placement.distortion_m;
     match (placement.per_tile, placement.curved) {
         (true, true) => Some(
-            "in tileset.json each tile has a transform of its own, because the terrain is too wide for one: neighbours do not quite meet, by \
-             some metres where it is hundreds of kilometres wide; [output] compression = \"meshopt\" bends tiles along all axes, so that \
-             they meet exactly"
+            "tiles have gaps of up to some metres on the globe, because the terrain is too wide for one transform; fix: [output] \
+             compression = \"meshopt\", with which they meet exactly"
                 .into(),
         ),
         _ if off <= ONE_TRANSFORM => None,
         (false, true) => Some(format!(
-            "tileset.json puts places up to {off:.1} m beside where they belong on the earth; [output] compression = \"meshopt\" bends tiles \
-             along all axes, and [input] bounds gives a smaller terrain"
+            "places are up to {off:.1} m off on the globe; fix: [output] compression = \"meshopt\", or [input] bounds for a smaller \
+             terrain"
         )),
         (per_tile, false) => Some(format!(
-            "in tileset.json {} lies flat on the tangent plane at its middle, up to {off:.1} m off the curved earth{}; smaller tiles \
-             follow it more closely: lower [triangulation] max_points_per_tile, and leave out long triangles along the hull with \
-             [output] max_edge",
+            "on the globe {} is flat, up to {off:.1} m off the curved earth{}; fix: a lower [triangulation] max_points_per_tile for \
+             smaller tiles, and [output] max_edge without long triangles along the hull",
             if per_tile { "each tile" } else { "the only tile" },
-            if per_tile { ", and neighbours do not quite meet" } else { "" }
+            if per_tile { ", with gaps between neighbours" } else { "" }
         )),
     }
 }

@@ -109,14 +109,13 @@ impl EarlierRun {
         }
         let modified = now.modified_since(planned).map(|files| {
             format!(
-                "{files}: modified after the job was planned; if the content has changed, the terrain may show the old one: submit the job \
-                 with --restart"
+                "{files}: modified after the job was planned, so the terrain may show old content; fix: submit the job with --restart"
             )
         });
         let other_time = || {
             let files = now.with_other_times(&planned.fingerprint)?;
             Some(format!(
-                "{files}: the time of its last change is another one than when the job was planned; `gdt-batch verify OUT --input FILE` \
+                "{files}: its modification time differs from that when the job was planned; fix: `gdt-batch verify OUT --input FILE` \
                  proves whether its points have changed"
             ))
         };

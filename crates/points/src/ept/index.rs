@@ -146,7 +146,7 @@ impl SystemOfIndex {
         match NamedCrs::try_from(format!("EPSG:{codes}")) {
             Ok(named) => Ok(*named.crs),
             Err(why) => {
-                warnings.push(format!("its coordinate system (EPSG:{codes}) is not known: {why}"));
+                warnings.push(format!("its coordinate system (EPSG:{codes}) is unknown ({why}); fix: [input] crs"));
                 Ok(crs)
             }
         }

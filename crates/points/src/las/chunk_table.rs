@@ -70,13 +70,13 @@ pub(crate) fn find(
         Ok((chunks, surplus)) => {
             if surplus > 0 {
                 warnings
-                    .push(format!("the chunks hold {surplus} points more than the header says; those are left out"));
+                    .push(format!("its chunks hold {surplus} points more than its header gives; those are left out"));
             }
             Ok(chunks)
         }
         Err(TableError::Unreadable(error)) => Err(error),
         Err(damage) => {
-            warnings.push(format!("the table of its compressed chunks {damage}; they are found one by one instead"));
+            warnings.push(format!("its chunk table {damage}; the chunks are found one by one instead"));
             walk(file, header, compression)
         }
     }

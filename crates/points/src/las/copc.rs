@@ -118,7 +118,7 @@ impl CopcIndex {
             Err(IndexError::Unreadable(error)) => Err(error),
             Err(damage) => {
                 warnings.push(format!(
-                    "its octree (COPC) {damage}: the octree is left aside, and all points are read to find those within bounds"
+                    "its octree (COPC) {damage}: all points are read, to find those within [input] bounds"
                 ));
                 Ok(None)
             }

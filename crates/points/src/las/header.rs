@@ -149,7 +149,7 @@ fn counts(bytes: &[u8], minor: u8, warnings: &mut Warnings) -> (u64, Vec<u64>) {
         return (old, (0..5).map(|i| uint32(bytes, 111 + 4 * i) as u64).collect());
     }
     if old != 0 && old != new {
-        warnings.push(format!("the header's two point counts differ: {old} (32 bit) and {new} (64 bit, used)"));
+        warnings.push(format!("its header has two point counts that differ: {old} (32 bit) and {new} (64 bit, used)"));
     }
     (new, (0..15).map(|i| uint64(bytes, 255 + 8 * i)).collect())
 }

@@ -55,7 +55,7 @@ pub(crate) fn list(file: &RandomAccessFile, header: &LasHeader, warnings: &mut W
     let mut vlrs = ordinary.walk(file)?;
     if (vlrs.len() as u32) < header.vlrs.min(MOST) {
         warnings.push(format!(
-            "the header says {} variable length records, but only {} fit before the points",
+            "its header gives {} variable length records, but only {} fit before the points",
             header.vlrs,
             vlrs.len()
         ));
@@ -66,7 +66,7 @@ pub(crate) fn list(file: &RandomAccessFile, header: &LasHeader, warnings: &mut W
         let found = if at >= header.points_at { extended.walk(file)? } else { Vec::new() };
         if (found.len() as u32) < count.min(MOST) {
             warnings.push(format!(
-                "the header says {count} extended variable length records at byte {at}, but only {} are there",
+                "its header gives {count} extended variable length records at byte {at}, but only {} are there",
                 found.len()
             ));
         }

@@ -64,7 +64,7 @@ impl LeftOut {
     /// Returns a warning that names the place too.
     fn warning_at(&self, why: [&str; 2], what_to_do: &str) -> Option<String> {
         let [x, y] = self.place;
-        self.warning(why).map(|warning| format!("{warning} at ({x}, {y}): {what_to_do}"))
+        self.warning(why).map(|warning| format!("{warning} at ({x}, {y}); fix: {what_to_do}"))
     }
 
     /// Returns a warning about one feature, or about several: what is said of one, and of several.
@@ -158,10 +158,8 @@ impl<'a> FeatureCollector<'a> {
         ));
         warnings.extend(of(
             &self.without_inside,
-            "is an area whose outline encloses nothing (it has fewer than three vertices, lies on one line, or goes back over its own way) and \
-             is left out",
-            "are areas whose outline encloses nothing (it has fewer than three vertices, lies on one line, or goes back over its own way) and \
-             are left out",
+            "is an area whose outline encloses nothing, and is left out",
+            "are areas whose outline encloses nothing, and are left out",
         ));
         warnings.extend(of(
             &self.without_area,
@@ -179,21 +177,32 @@ impl<'a> FeatureCollector<'a> {
             "have a value of kind_field that kinds does not list and are left out",
         ));
         warnings.extend(self.crossing.warning_at(
-            ["is a lake whose outlines cross", "are lakes whose outlines cross"],
-            "water and land alternate there; mend them (in QGIS: \"Fix geometries\") if they should not",
+            [
+                "is a lake whose outlines cross, so water and land alternate",
+                "are lakes whose outlines cross, so water and land alternate",
+            ],
+            "\"Fix geometries\" in QGIS",
         ));
         warnings.extend(self.hole_outside.warning_at(
-            ["is a lake with a hole outside of its outline", "are lakes with a hole outside of their outline"],
-            "it is taken for water; make it a lake of its own, or remove it",
+            [
+                "is a lake with a hole outside its outline, which is taken for water",
+                "are lakes with a hole outside their outline, which \
+             is taken for water",
+            ],
+            "make it a lake of its own, or remove it",
         ));
         warnings.extend(self.enclosing_nothing.warning_at(
-            ["is a lake whose outlines enclose nothing", "are lakes whose outlines enclose nothing"],
-            "they go over all of their way twice, or a hole covers them, and no water is there; remove what repeats or covers them",
+            [
+                "is a lake whose outlines enclose nothing, because they repeat, or a hole covers them",
+                "are lakes whose outlines enclose \
+             nothing, because they repeat, or a hole covers them",
+            ],
+            "remove what repeats or covers them",
         ));
         warnings.extend(of(
             &self.not_looked_at,
-            "is a lake with too many edges side by side or too many holes, so that faults of its outlines are not looked for",
-            "are lakes with too many edges side by side or too many holes, so that faults of their outlines are not looked for",
+            "is a lake with too many holes or edges side by side: its outlines are not checked",
+            "are lakes with too many holes or edges side by side: their outlines are not checked",
         ));
         (self.features, warnings)
     }

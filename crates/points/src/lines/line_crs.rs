@@ -75,8 +75,7 @@ fn convert_heights(file: &mut LineFile, own: &Crs, points: &SystemOfPoints) {
         // Without a unit of height, heights are in the unit of x and y.
         if plane.is_some_and(|plane| !same_length(plane, to)) {
             file.warnings.push(format!(
-                "it does not say the unit of its heights: it is taken to be {}, as that of the points (set height_unit in [[breaklines]] to \
-                 say otherwise)",
+                "it has no unit of heights: {} assumed, as for the points; fix: [[breaklines]] height_unit, if that is wrong",
                 unit_name(to)
             ));
         }
@@ -86,7 +85,7 @@ fn convert_heights(file: &mut LineFile, own: &Crs, points: &SystemOfPoints) {
         scale_heights(file, from / to);
         let why = match points.crs.vertical {
             Some(_) => "the unit of the points' heights",
-            None => "the unit of x and y, since the points do not say the unit of their heights",
+            None => "the unit of x and y, because the points have no unit of heights",
         };
         file.warnings.push(format!("its heights are converted from {} to {}, {why}", unit_name(from), unit_name(to)));
     }
@@ -106,14 +105,14 @@ fn unit_name(metres: f64) -> String {
 fn warn_of_missing(file: &mut LineFile, own: &Crs, points: &Crs) {
     if points.is_named() && file.warnings.is_empty() {
         file.warnings.push(format!(
-            "it says no CRS: its {} are taken to be in that of the points, {}",
+            "it has no CRS: its {} are taken to be in that of the points, {}",
             file.purpose.features(),
             points.label()
         ));
     }
     if own.is_named() {
         file.warnings.push(format!(
-            "its {} are in {}, and the points say no CRS: they are taken to be in the same",
+            "its {} are in {}, and the points have no CRS: the same assumed for them; fix: [input] crs, if that is wrong",
             file.purpose.features(),
             own.label()
         ));
@@ -121,7 +120,7 @@ fn warn_of_missing(file: &mut LineFile, own: &Crs, points: &Crs) {
 }
 
 fn assumed(names: &str) -> String {
-    format!("not both datums are named: {names} are assumed to be one; two datums may be hundreds of metres apart")
+    format!("a datum is unknown: {names} are assumed to be one, though two datums may be hundreds of metres apart")
 }
 
 /// Transforms the features of `file`, which are in the system `own`, into that of the points.
@@ -167,9 +166,9 @@ fn transform(file: &mut LineFile, own: &Crs, points: &SystemOfPoints, has_height
     match way.datums() {
         DatumNote::Same => {}
         DatumNote::Assumed(names) => file.warnings.push(assumed(names)),
-        DatumNote::TakenAlike(names) if file.purpose == LinePurpose::Breaklines => file
-            .warnings
-            .push(format!("[input] datums = \"close\" takes {names} for one datum; they may be a metre or two apart")),
+        DatumNote::TakenAlike(names) if file.purpose == LinePurpose::Breaklines => file.warnings.push(format!(
+            "no datum shift between {names}, which may be a metre or two apart ([input] datums = \"close\")"
+        )),
         DatumNote::TakenAlike(names) => {
             file.warnings.push(format!("no datum shift between {names}, which may be a metre or two apart"));
         }
@@ -254,9 +253,9 @@ mod tests {
         assert!(bring(&zone_15, "auto", &zone_15).unwrap().is_empty());
         assert!(bring(&Crs::default(), "auto", &Crs::default()).unwrap().is_empty());
         let taken = bring(&Crs::default(), "auto", &zone_15).unwrap();
-        assert!(taken.iter().any(|warning| warning.contains("says no CRS")));
+        assert!(taken.iter().any(|warning| warning.contains("has no CRS")));
         let without = bring(&zone_15, "auto", &Crs::default()).unwrap();
-        assert!(without.iter().any(|warning| warning.contains("the points say no CRS")));
+        assert!(without.iter().any(|warning| warning.contains("the points have no CRS")));
         for points in [&zone_15, &Crs::default()] {
             assert!(bring(&degrees, "points", points).unwrap().is_empty());
         }
@@ -282,7 +281,7 @@ mod tests {
             file.warnings.iter().map(|warning| warning.to_string()).collect::<Vec<_>>().concat()
         };
         let alike = lines(&wgs84, DatumRule::Close);
-        assert!(alike.contains("takes WGS 84 and NAD83 for one datum"), "{alike}");
+        assert!(alike.contains("no datum shift between WGS 84 and NAD83"), "{alike}");
         let nameless = system(
             &zone_15
                 .wkt
@@ -347,7 +346,7 @@ mod tests {
             (&feet, auto, &plane, 10.0 * FOOT, "from US survey foot to metre, the unit of x and y"),
             (&feet, auto, &metres, 10.0 * FOOT, "from US survey foot to metre, the unit of the points' heights"),
             (&metres, auto, &feet, 10.0 / FOOT, "from metre to US survey foot"),
-            (&plane, auto, &feet, 10.0, "it is taken to be US survey foot"),
+            (&plane, auto, &feet, 10.0, "US survey foot assumed"),
             (&plane, auto, &metres, 10.0, ""),
             (&feet, auto, &feet, 10.0, ""),
             (&plane, "height_unit = \"foot\"", &plane, 3.048, "from foot to metre"),
@@ -372,6 +371,6 @@ mod tests {
     fn depths_over_heights_are_named() {
         let depths = Crs { vertical: Some(1.0), ..system("EPSG:26915+6357") };
         let (_, said) = height(&depths, "", &system("EPSG:26915"));
-        assert!(said.contains("counts downwards"), "{said}");
+        assert!(said.contains("is a depth"), "{said}");
     }
 }

@@ -148,7 +148,8 @@ fn attributes(path: &Path, options: &LineOptions) -> Result<Option<DbfTable>> {
 fn crs(path: &Path, purpose: LinePurpose, warnings: &mut Warnings) -> Result<Crs> {
     let Some(prj) = beside(path, "prj") else {
         warnings.push(format!(
-            "there is no .prj file beside it, so it says no CRS: its {} are taken to be in that of the points",
+            "it has no .prj file, so its CRS is unknown: its {} are taken to be in that of the points; fix: copy the .prj file too, or \
+             set crs in its table",
             purpose.features()
         ));
         return Ok(Crs::default());

@@ -15,7 +15,10 @@ const MOST: u64 = 1 << 28;
 /// The endings of texts that a line may name.
 const TEXTS: [&str; 5] = [".csv", ".xyz", ".asc", ".pts", ".tsv"];
 
-/// Returns the clouds that the text names; `None` if its first lines do not all name one.
+/// Returns the clouds that the text names; `None` if its first lines name none, or one of them is a row of numbers.
+///
+/// # Errors
+/// [`Error::Input`] names the first line that names no cloud, [`Error::Io`] a file that cannot be read.
 pub(super) fn clouds_of(path: &Path) -> Result<Option<Vec<ListedCloud>>> {
     let file = RandomAccessFile::open(path)?;
     let head = file.bytes(0..file.size().min(HEAD))?;
@@ -33,7 +36,7 @@ pub(super) fn clouds_of(path: &Path) -> Result<Option<Vec<ListedCloud>>> {
         let refused = |what: String| Error::input(path, format!("line {number}: {what}"));
         if !names_cloud(line) {
             return Err(refused(format!(
-                "{line:?} names no point cloud (.las, .laz, ept.json, or a text such as .csv), as the lines before do"
+                "{line:?} is not a point cloud (.las, .laz, ept.json, or a text such as .csv), as the other lines are; fix: remove the line, or put # before it"
             )));
         }
         clouds.push(ListedCloud { path: place_of(path, line).map_err(refused)?, claim: None });
@@ -41,11 +44,17 @@ pub(super) fn clouds_of(path: &Path) -> Result<Option<Vec<ListedCloud>>> {
     Ok(Some(clouds))
 }
 
-/// Returns whether all lines name a point cloud, and there are some. The last line counts only if the text `is_whole`.
+/// Returns whether a line names a point cloud, and no line is a row of numbers. The last line is looked at only if the text `is_whole`.
 fn is_list(head: &str, is_whole: bool) -> bool {
     let end = if is_whole { head.len() } else { head.rfind('\n').unwrap_or(0) };
-    let mut lines = entries(&head[..end]).peekable();
-    lines.peek().is_some() && lines.all(|(_, line)| names_cloud(line))
+    let lines = || entries(&head[..end]).map(|(_, line)| line);
+    lines().any(names_cloud) && !lines().any(is_row)
+}
+
+/// Returns whether a line begins with three numbers, as those of tables of points do.
+fn is_row(line: &str) -> bool {
+    let mut fields = line.split([',', ';', '\t', ' ']).filter(|field| !field.is_empty());
+    (0..3).all(|_| fields.next().is_some_and(|field| field.parse::<f64>().is_ok()))
 }
 
 /// Returns the lines that count, with their numbers from 1 on.
@@ -90,6 +99,7 @@ mod tests {
             "# a.laz\n1 2 3\n",
             "x,y,z\n1,2,3\n",
             "a.laz\n1 2 3\n",
+            "1.5,2,3,a.laz\n4,5,6,a.laz\n",
             "",
             "# a.laz\n",
             ".csv\n",
@@ -100,12 +110,14 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_names_no_cloud_far_behind_is_an_error() {
+    fn a_line_that_names_no_cloud_is_an_error() {
         let text = "tile.laz\n".repeat(HEAD as usize / 8) + "roads.gpkg\n";
         let error = clouds(text.as_bytes()).unwrap_err().to_string();
-        assert!(error.contains("line 2049: \"roads.gpkg\" names no point cloud"), "{error}");
+        assert!(error.contains("line 2049: \"roads.gpkg\" is not a point cloud"), "{error}");
         let error = clouds(&[text.replace("roads.gpkg", "").as_bytes(), b"\xff.laz\n"].concat()).unwrap_err();
         assert!(error.to_string().contains("not in UTF-8"), "{error}");
+        let error = clouds(b"tiles of 2024\na.laz\nb.laz\n").unwrap_err().to_string();
+        assert!(error.contains("line 1: \"tiles of 2024\" is not a point cloud"), "{error}");
         let error = clouds(b"a.laz\nftp://host/b.laz\n").unwrap_err().to_string();
         assert!(error.contains("line 2: files are read by https://"), "{error}");
     }

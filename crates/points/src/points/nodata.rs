@@ -260,9 +260,8 @@ pub fn who_has(SharedHeight { value, count, first }: &SharedHeight, record: &str
 
 fn real_nodata(height: &SharedHeight, [low, high]: [f64; 2], record: &str) -> String {
     format!(
-        "{}, which [input] nodata leaves out, though the other heights of the file, from {low} to {high}, are next to it: such points may be \
-         real, as those of the sea. nodata holds for all files: if they are real, remove it, and the points without a height from the other \
-         files",
+        "{}, which [input] nodata leaves out, though they may be real, as the sea is: the other heights lie from {low} to {high}; fix: \
+         if they are real, set [input] nodata = \"none\"",
         who_has(height, record)
     )
 }
@@ -270,8 +269,8 @@ fn real_nodata(height: &SharedHeight, [low, high]: [f64; 2], record: &str) -> St
 /// Returns a warning about a height that stands for nodata. Records of the file are called `record`.
 pub(crate) fn left_out(height: &SharedHeight, record: &str) -> String {
     // Nothing keeps a height that no lattice holds.
-    let remedy = if height.value.abs() < NO_HEIGHT { "; [input] nodata = \"none\" keeps such points" } else { "" };
-    format!("{}, which stands for nodata, far from all other heights: left out{remedy}", who_has(height, record))
+    let remedy = if height.value.abs() < NO_HEIGHT { "; fix: [input] nodata = \"none\" keeps them" } else { "" };
+    format!("{}, far from all others: taken for nodata and left out{remedy}", who_has(height, record))
 }
 
 #[cfg(test)]

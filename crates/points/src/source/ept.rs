@@ -22,7 +22,7 @@ impl Source {
         let points = EptPoints::read(file.path(), &index, choice.bounds, choice.use_index)?;
         if points.missing > 0 {
             let (all, held) = (index.points, index.points - points.missing);
-            warnings.push(format!("the index promises {all} points, but its hierarchy has only {held}"));
+            warnings.push(format!("the index gives {all} points, but its hierarchy has only {held}"));
         }
         let [min, max] = index.bounds;
         if min.iter().chain(&max).any(|value| !value.is_finite()) {

@@ -69,14 +69,14 @@ impl Source {
         let stated = Some(self.crs.horizontal).filter(|unit| *unit != Unit::Unknown);
         let label = self.crs.label();
         self.warnings.push(if is_crs_stated {
-            format!("its record of a geocentric coordinate system ({label}) is ignored: [input] states what its points are in")
+            format!("its geocentric coordinate system ({label}) is ignored, because [input] names another")
         } else {
             let in_unit = stated.map_or_else(String::new, |unit| {
-                format!(" in the unit {} (set [input] unit to state another)", unit.name())
+                format!(" in {}", unit.name())
             });
             format!(
-                "its coordinate system ({label}) is geocentric, but {why}. The record is ignored: unless [input] crs, missing_crs or another \
-                 file states what the points are in, they are taken as a plane{in_unit}"
+                "its coordinate system ({label}) is geocentric, but {why}: the record is ignored, and x and y are a plane{in_unit}; \
+                 fix: [input] crs = \"EPSG:...\""
             )
         });
         self.crs = Crs::default();

@@ -42,9 +42,9 @@ const UNCLEAR_COMMA: &str = "has only whole numbers with commas between them, mo
                              [input.csv], for example [\"x\", \"y\", \"z\", \"class\"], and if they do, write it again with points before \
                              decimals or with semicolons between columns";
 
-const DOUBTFUL_COMMA: &str = "has only whole numbers with commas between them, more than three in a row, and no line names all of them: the commas are \
-                              taken to stand between columns; name all columns with `columns` under [input.csv], and if commas also stand \
-                              before the decimals of heights, as in 565000,5933000,12,5, write it again with points there";
+const DOUBTFUL_COMMA: &str = "has whole numbers with commas between them and no full header: the commas are read as delimiters; fix: \
+                              [input.csv] columns with all columns; if commas are decimal commas too, as in 565000,5933000,12,5, write \
+                              points there";
 
 const UNCLEAR_THOUSANDS: &str = "has commas that may stand before decimals or between thousands, as in 565,000: write it again with points \
                                  before decimals, and nothing between thousands";
@@ -274,8 +274,7 @@ fn used_roles(found: Option<&NamedColumns>, choice: &RowChoice) -> Vec<ColumnRol
 fn unknown_units(found: Option<&NamedColumns>) -> Option<String> {
     let unknown = &found.filter(|found| !found.unknown_units.is_empty())?.unknown_units;
     Some(format!(
-        "the names of its columns have \"{}\" in brackets, which is no unit that is known here: it is left aside (if it is a unit of length, \
-         set [input] unit)",
+        "the unit \"{}\" in the names of its columns is unknown, and ignored; fix: [input] unit, if it is a unit of length",
         unknown.join("\" and \"")
     ))
 }
@@ -283,11 +282,11 @@ fn unknown_units(found: Option<&NamedColumns>) -> Option<String> {
 fn names_warning(found: Option<&NamedColumns>, is_foot_unclear: bool, columns: usize) -> Option<String> {
     let warning = match found {
         None if columns > 3 => {
-            "no line names the columns: the first three are taken for x, y and z; say otherwise with `columns` under [input.csv]"
+            "it has no header, so its first three columns are x, y and z; fix: [input.csv] columns, if that is wrong"
         }
         Some(_) if is_foot_unclear => {
-            "the names of the columns say feet, but not which: they count as international feet (0.3048 m); if they are US survey feet, \
-             set [input] unit = \"us-foot\""
+            "its columns are in feet of an unknown kind: international feet (0.3048 m) assumed; fix: [input] unit = \"us-foot\" for US \
+             survey feet"
         }
         _ => return None,
     };

@@ -92,7 +92,7 @@ pub(crate) fn find(file: &RandomAccessFile, columns: &Columns, rows: &Range<u64>
     let last = shown(last);
     if !is_sure {
         return Ok(Ending::Doubtful(format!(
-            "the last line, {last}, has no line end and {less}: the file may be cut off"
+            "the last line, {last}, has no line end and {less}: the file may be cut off; fix: copy the file again"
         )));
     }
     let what = format!(

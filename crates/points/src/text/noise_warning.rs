@@ -42,7 +42,7 @@ pub(crate) fn noise_warning(
     })?;
     let written = written.unwrap_or_else(|| Decimal::new(first.mantissa, first.decimals.into()).to_string());
     Ok(Some(format!(
-        "{} numbers have more digits than floating point holds, such as {written}, which counts as {meant}",
+        "{} numbers have more digits than floating point holds, such as {written}: read as {meant}",
         found.noisy
     )))
 }

@@ -32,12 +32,15 @@ pub(crate) fn drop_unreadable_colors(delimiter: Delimiter, roles: &mut [ColumnRo
     let found: Vec<String> = rows.iter().filter_map(|row| bad(&row)).collect();
     let example = found.first()?;
     if found.len() * 2 <= rows.len() {
-        return Some(format!("some colours are no numbers from 0 to 65535, such as {example}: they are read as 0"));
+        return Some(format!("some colours are not numbers from 0 to 65535, such as {example}: they are read as 0"));
     }
     for role in roles.iter_mut().filter(|role| is_color(role)) {
         *role = ColumnRole::Skipped;
     }
-    Some(format!("its colours are no numbers from 0 to 65535, such as {example}: they are left out"))
+    Some(format!(
+        "its colours are not numbers from 0 to 65535, such as {example}, and are ignored; fix: [input.csv] columns, if these \
+     are not the colours"
+    ))
 }
 
 /// Returns a warning if one of these rows has a class that cannot be read.
@@ -46,7 +49,7 @@ pub(crate) fn unreadable_class(delimiter: Delimiter, roles: &[ColumnRole], rows:
     let class = |field: &[u8]| Number::parse(field).and_then(class_of);
     let example = rows.iter().find_map(|row| unreadable(delimiter, roles, row, is_class, |f| class(f).is_some()))?;
     Some(format!(
-        "some classes are no whole numbers from 0 to 255, such as {example}: they count as 0, \"never classified\""
+        "some classes are not whole numbers from 0 to 255, such as {example}: they are read as 0, \"never classified\""
     ))
 }
 
@@ -56,7 +59,7 @@ pub(crate) fn unreadable_intensity(delimiter: Delimiter, roles: &[ColumnRole], r
     let intensity = |field: &[u8]| Number::parse(field).and_then(|number| brightness_of(number, false));
     let is_readable = |field: &[u8]| intensity(field).is_some();
     let example = rows.iter().find_map(|row| unreadable(delimiter, roles, row, is_intensity, is_readable))?;
-    Some(format!("some intensities are no numbers from 0 to 65535, such as {example}: they are read as 0"))
+    Some(format!("some intensities are not numbers from 0 to 65535, such as {example}: they are read as 0"))
 }
 
 /// Returns the first column of `row` with a wanted role that holds something which cannot be read, for a message.
@@ -128,7 +131,7 @@ impl BrightnessScale {
         let taken = if self.are_from_0_to_1() { "as numbers from 0 to 1" } else { "as whole numbers" };
         (low.min(high) * FEW > low.max(high)).then(|| {
             format!(
-                "its {name} are from 0 to 1 in {low} rows, with decimals, and greater or less in {high}: all of them are taken {taken}"
+                "its {name} have decimals from 0 to 1 in {low} rows, and other values in {high}: all are read {taken}"
             )
         })
     }

@@ -56,9 +56,11 @@ pub(crate) fn count_warning(counts: &[StatedCount], rows: u64) -> Option<String>
     }
     let StatedCount { points, comment } = first;
     Some(if *points > rows {
-        format!("the comment {comment} promises {points} points, but the file has only {rows}: it may be cut off")
+        format!(
+            "the comment {comment} gives {points} points, but the file has only {rows}: it may be cut off; fix: copy the file again"
+        )
     } else {
-        format!("the comment {comment} promises {points} points, but the file has {rows}: all of them are read")
+        format!("the comment {comment} gives {points} points, but the file has {rows}: all are read")
     })
 }
 
@@ -107,7 +109,7 @@ mod tests {
         };
         assert!(warning(&[], 5).is_none() && warning(&[5], 5).is_none() && warning(&[9, 5], 5).is_none());
         assert!(warning(&[2, 3], 5).is_none());
-        assert!(warning(&[9], 5).is_some_and(|what| what.contains("promises 9 points, but the file has only 5")));
-        assert!(warning(&[2], 5).is_some_and(|what| what.contains("promises 2 points, but the file has 5")));
+        assert!(warning(&[9], 5).is_some_and(|what| what.contains("gives 9 points, but the file has only 5")));
+        assert!(warning(&[2], 5).is_some_and(|what| what.contains("gives 2 points, but the file has 5")));
     }
 }

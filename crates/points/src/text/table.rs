@@ -174,7 +174,7 @@ impl TextTable {
         let chunks = starts_of_chunks(&surveys, first.line);
         let bounds = all.bounds();
         if all.rows > all.without_height && bounds.is_none() {
-            warnings.push("no line has numbers where x, y and z should be");
+            warnings.push("no line has numbers in the columns of x, y and z; fix: [input.csv] columns");
         }
         refuse_tiny(file, &all.wanted)?;
         columns.unit_colors = all.colors.are_from_0_to_1();
@@ -223,8 +223,8 @@ impl TextTable {
                 table.unit = Unit::Degree;
             } else {
                 warnings.push(format!(
-                    "its columns are named as longitude and latitude, but hold no degrees (x from {} to {}, y from {} to {}): they count as \
-                     lengths. Degrees and minutes in one number, or degrees times ten million, must be made degrees and transformed first",
+                    "its columns are named longitude and latitude, but are not degrees (x {} to {}, y {} to {}): they are read as \
+                     lengths; fix: convert them to decimal degrees first",
                     min[0], max[0], min[1], max[1]
                 ));
             }
@@ -504,8 +504,8 @@ fn no_heights(rows: &RowBox) -> Option<String> {
     let (min, max) = (rows.min[2], rows.max[2]);
     (min > HIGHEST || max < -HIGHEST).then(|| {
         format!(
-            "all heights are {min} to {max}, which is no height on Earth in metres: no line names the columns, so x, y and z were taken from \
-             columns 1, 2 and 3. Name the columns with `columns` under [input.csv], or set [input] unit"
+            "all heights are from {min} to {max}, too high for metres: without a header, columns 1, 2 and 3 are x, y and z; fix: \
+             [input.csv] columns, or [input] unit"
         )
     })
 }
@@ -516,9 +516,9 @@ fn missing_rows(promised: Option<u64>, rows: u64, warnings: &mut Warnings) -> u6
     let promised = promised.map(|promised| promised.min(1 << 40));
     let Some(promised) = promised.filter(|promised| *promised != rows) else { return 0 };
     warnings.push(if promised > rows {
-        format!("the first line promises {promised} points, but the file has only {rows}")
+        format!("the first line gives {promised} points, but the file has only {rows}")
     } else {
-        format!("the first line promises {promised} points, but the file has {rows}: all of them are read")
+        format!("the first line gives {promised} points, but the file has {rows}: all are read")
     });
     promised.saturating_sub(rows)
 }

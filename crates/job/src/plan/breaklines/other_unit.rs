@@ -61,17 +61,17 @@ impl UnitJudge<'_> {
         let (factor, pairs) =
             fitting.map(|factor| (factor, pairs)).or_else(|| [pairs, &low_side].into_iter().find_map(multiple))?;
         let [line, points] = middles(pairs)?;
-        let numbers = format!("in the middle {line}, where that of the points around is {points}");
+        let numbers = format!("median {line}, points around {points}");
         Some(match self.unit_of_lines(factor) {
             Some((unit, option)) => format!(
-                "its heights seem to be in {unit}, {}: {numbers}; set height_unit = \"{option}\" in [[breaklines]] {}",
+                "its heights seem to be in {unit}, {} ({numbers}); fix: [[breaklines]] height_unit = \"{option}\" {}",
                 self.taken(),
                 if self.scale == 1.0 { "to convert them" } else { "instead" }
             ),
             None => format!(
-                "its heights seem to be in {}, and those of the points in {}: {numbers}, but the points are taken to be in {}: say with \
-                 [input] unit or crs what the points are in, such as crs = \"EPSG:26915+6360\" for heights in US survey feet, and with \
-                 height_unit in [[breaklines]] what the lines are in",
+                "its heights seem to be in {}, and those of the points in {} ({numbers}), but {} is assumed for the points; fix: \
+                 [input] unit or crs for the points, such as [input] crs = \"EPSG:26915+6360\" for heights in US survey feet, and \
+                 [[breaklines]] height_unit for the lines",
                 if factor < 1.0 { "feet" } else { "metres" },
                 if factor < 1.0 { "metres" } else { "feet" },
                 self.unit_of_points().name()
@@ -94,8 +94,8 @@ impl UnitJudge<'_> {
             ),
         };
         Some(format!(
-            "its heights {what}: in the middle {line}, where that of the points around is {points}; convert them, or set heights = \"points\" \
-             in [[breaklines]] to take them from the points around"
+            "its heights {what} (median {line}, points around {points}); fix: convert them, or [[breaklines]] heights = \"points\" \
+             takes them from the points"
         ))
     }
 
@@ -122,16 +122,16 @@ impl UnitJudge<'_> {
             count => format!(" (and {} more of {} features)", count.saturating_sub(1), features.len()),
         };
         let [line, points] = middles(pairs)?;
-        let numbers_of_first = format!("in the middle {line}, where that of the points around is {points}");
+        let numbers_of_first = format!("median {line}, points around {points}");
         let sentence = match self.unit_of_lines(factor) {
             Some((unit, option)) => format!(
-                "the heights of feature {first}{others} seem to be in {unit}, {}: {numbers_of_first}; convert them, or put such features into a \
-                 file of their own, with height_unit = \"{option}\" in its [[breaklines]]",
+                "the heights of feature {first}{others} seem to be in {unit}, {} ({numbers_of_first}); fix: convert them, or put such \
+                 features into a file of their own, with [[breaklines]] height_unit = \"{option}\"",
                 self.taken()
             ),
             None => format!(
-                "the heights of feature {first}{others} are 3.28 times too {}, as if they had been converted between feet and metres once too \
-                 often: {numbers_of_first}; correct them",
+                "the heights of feature {first}{others} are 3.28 times too {}, as if converted between feet and metres once too often \
+                 ({numbers_of_first}); fix: correct them",
                 if factor < 1.0 { "high" } else { "low" }
             ),
         };

@@ -26,22 +26,21 @@ pub(super) fn sentences(
     found.extend(findings.worst_uneven.first().map(|worst| names.uneven(worst)));
     if findings.empty_paths > 0 {
         found.push(format!(
-            "[[breaklines]]: {} parts of features are left out: lines shorter than a step of the lattice, outlines without three places on it, or \
-             lakes that a hole covers there",
-            findings.empty_paths
+            "[[breaklines]]: {} left out: smaller than a step of the lattice, or covered by a hole",
+            one_or_several(findings.empty_paths, ["part of a feature is", "parts of features are"])
         ));
     }
     if findings.rivers_without_heights > 0 {
         found.push(format!(
-            "[[breaklines]]: {} rivers take their heights from the points around; whether they rise is not looked at",
-            findings.rivers_without_heights
+            "[[breaklines]]: whether {} downstream is not checked: heights come from the points around",
+            one_or_several(findings.rivers_without_heights, ["river rises", "rivers rise"])
         ));
     }
     if findings.places_not_compared > 0 {
         found.push(format!(
-            "[[breaklines]]: at {} places a line with heights meets one that takes them from the points around; whether these disagree is not \
-             looked at",
-            findings.places_not_compared
+            "[[breaklines]]: at {} a line with heights meets one that takes them from the points around: whether they disagree is not \
+             checked",
+            counted(findings.places_not_compared, "place")
         ));
     }
     found
@@ -63,18 +62,18 @@ impl Names<'_> {
     fn nothing(&self, options: &BreaklineOptions, outside: u64) -> String {
         let features: u64 = self.files.iter().map(|file| file.features.len() as u64).sum();
         let why = if features == 0 {
-            "the files have no feature that is used".into()
+            "the files have no usable feature".into()
         } else if self.findings.segments == 0 && self.findings.empty_paths > 0 && outside < features {
-            "what lies in the box of the points is smaller than a step of the lattice".into()
+            "all features in the box of the points are smaller than a step of the lattice".into()
         } else if self.findings.segments == 0 {
             format!(
-                "none of {} reaches into the box of the points ({outside} far from it): look at their CRS",
+                "none of {} lies within the box of the points ({outside} far from it); fix: [[breaklines]] crs, if their CRS is wrong",
                 counted(features, "feature")
             )
         } else {
             let floor = self.length(options.floor.into());
             format!(
-                "what lies in the box of the points is shorter than {floor}, and lines that are so near to each other become one: set a smaller spacing"
+                "all lines in the box of the points are shorter than {floor}; fix: a smaller [[breaklines]] spacing"
             )
         };
         format!("[[breaklines]]: there are no breaklines: {why}")
@@ -82,8 +81,8 @@ impl Names<'_> {
 
     fn in_lake(&self, &InLake { id, lake, length, place }: &InLake) -> String {
         format!(
-            "[[breaklines]]: parts of lines or shores lie inside a lake, which is flat, and are left out; the worst is {}: about {} of it lie in \
-             {}, for example at {}; where it is to stay, cut it out of the lake as an island",
+            "[[breaklines]]: parts of lines inside a lake are left out, because a lake is flat; the longest is {}: about {} of it lie \
+             in {}, for example at {}; fix: cut it out of the lake as an island, to keep it",
             self.feature(id),
             self.length(length),
             self.feature(lake),
@@ -93,9 +92,9 @@ impl Names<'_> {
 
     fn disagreement(&self, &Disagreement { place, kept, other }: &Disagreement) -> String {
         format!(
-            "[[breaklines]]: heights disagree at {} places where lines meet; the worst is {}: {} has the height {}, which is taken (that \
-             of a lake before a river before a line, and the lowest of the same kind), and {} has {}",
-            self.findings.disagreements,
+            "[[breaklines]]: heights disagree at {} where lines meet; the worst is {}: {} has the height {}, which is used, and {} has \
+             {} (a lake goes before a river, a river before a line, the lower before the higher)",
+            counted(self.findings.disagreements, "place"),
             self.at(place),
             self.feature(kept.0),
             self.height(kept.1),
@@ -106,8 +105,8 @@ impl Names<'_> {
 
     fn rise(&self, &Rise { id, place, steps }: &Rise) -> String {
         format!(
-            "[[breaklines]]: {} down; the worst is {}, by {} at {}; its heights are kept as they are",
-            one_or_several(self.findings.rising_rivers, ["river rises on its way", "rivers rise on their way"]),
+            "[[breaklines]]: {} downstream; the worst is {}, by {} at {}; heights are kept",
+            one_or_several(self.findings.rising_rivers, ["river rises", "rivers rise"]),
             self.feature(id),
             self.difference(i64::from(steps)),
             self.at(place)
@@ -116,8 +115,7 @@ impl Names<'_> {
 
     fn uneven(&self, &Uneven { id, lowest, highest, place }: &Uneven) -> String {
         format!(
-            "[[breaklines]]: {}; the worst is {}, which is {} higher at {} than its lowest height, {}; that is the \
-             height of all of it",
+            "[[breaklines]]: {}; the worst is {}, which is {} higher at {} than its lowest height, {}, which all of it gets",
             one_or_several(self.findings.uneven_lakes, ["lake is not flat", "lakes are not flat"]),
             self.feature(id),
             self.difference(i64::from(highest) - i64::from(lowest)),

@@ -136,8 +136,8 @@ impl Judge<'_> {
         let is_all_zero = self.sampled(features).all(|vertex| vertex.z.is_none() || self.terrain.is_zero(vertex));
         (is_all_zero && beyond.abs() > self.terrain.in_height_unit(SHORE)).then(|| {
             format!(
-                "all its heights are 0, where the middle one of the points around is {}; if it has none, set heights = \"points\" in \
-                 [[breaklines]] to take them from the points around",
+                "all its heights are 0, but the median of the points around is {}; fix: [[breaklines]] heights = \"points\" takes them \
+                 from the points",
                 rounded(median(pairs.iter().map(|(_, around)| around.middle)).unwrap_or_default())
             )
         })
@@ -159,9 +159,8 @@ impl Judge<'_> {
             let side = if beyond > 0.0 { "above" } else { "below" };
             let unit = units.hint(pairs).map(|unit| format!("be in another unit ({unit}), ")).unwrap_or_default();
             format!(
-                "its heights lie {side} the terrain, in the middle {line}, where that of the points around is {points}: they may {unit}count \
-                 from another zero, such as the ellipsoid, or be no heights of the ground; convert them, or set heights = \"points\" in \
-                 [[breaklines]] to take them from the points around"
+                "its heights lie {side} the terrain (median {line}, points around {points}): they may {unit}have another datum, such as \
+                 the ellipsoid; fix: convert them, or [[breaklines]] heights = \"points\" takes them from the points"
             )
         })
     }
@@ -180,15 +179,13 @@ impl Judge<'_> {
         };
         let z = self.terrain.height(vertex)?;
         let (z, what) = match doubt {
-            Doubt::Zero => (0.0, ": if 0 stands for no height, correct it,"),
-            Doubt::Nodata => (z, ", which may stand for no height (nodata): correct it,"),
-            Doubt::Far => {
-                (z, ": correct it, set height_unit in [[breaklines]] if the heights of the file are in another unit,")
-            }
+            Doubt::Zero => (0.0, "; fix: correct it, if 0 stands for no height,"),
+            Doubt::Nodata => (z, "; fix: correct it, if it stands for nodata,"),
+            Doubt::Far => (z, "; fix: correct it, set [[breaklines]] height_unit if the file is in another unit,"),
         };
         Some(format!(
-            "feature {} has the height {z} at {}, where the points around lie from {} to {}{others}{what} or set heights = \"points\" in \
-             [[breaklines]] to take all heights from the points around",
+            "feature {} has the height {z} at {}, where the points around lie from {} to {}{others}{what} or [[breaklines]] heights = \
+             \"points\" takes all heights from the points",
             feature.id.feature,
             self.terrain.place_text(vertex.place),
             rounded(around.lowest),

@@ -26,7 +26,7 @@ pub(crate) fn too_large(format: ExportFormat, triangles: u64, max_error: MaxErro
         if max_error.is_none() { "set [output] max_error for fewer" } else { "set a greater [output] max_error" };
     (triangles > most).then(|| {
         format!(
-            "{} is not written: {} triangles are more than the {} that programs open in this format; {cure}",
+            "{} is not written: {} triangles are more than the {} that programs open in this format; fix: {cure}",
             format.file_name(),
             grouped(triangles),
             grouped(most),

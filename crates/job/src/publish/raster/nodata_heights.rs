@@ -63,16 +63,15 @@ impl NodataPoints {
         let warning = format!("{file} has the height {height} in {cells}, and {height} stands for nodata there");
         if self.first.is_empty() {
             return format!(
-                "{warning}: no point has this height, it is between the heights of points; set [output.raster] nodata = \"nan\" or \
-                 another number"
+                "{warning}: it lies between the heights of points; fix: [output.raster] nodata = \"nan\", or another number"
             );
         }
         let place = |[x, y]: &[i32; 2]| format!("({}, {})", lattice.world_text(0, *x), lattice.world_text(1, *y));
         let places: Vec<String> = self.first.iter().map(place).collect();
         let more = if self.are_more { " and other places" } else { "" };
         format!(
-            "{warning}: points at {}{more} have it; if it stands for nodata in the input too, leave these points out with [input] nodata = \
-             {height}; if it is a height, set [output.raster] nodata = \"nan\" or another number",
+            "{warning}: points at {}{more} have it; fix: [input] nodata = {height} if it stands for nodata in the input too, otherwise \
+             [output.raster] nodata = \"nan\" or another number",
             places.join(", ")
         )
     }
@@ -112,7 +111,7 @@ mod tests {
         let shared = [3, 8, -10_099];
         let two = warning(&[&[[4, 1, -10_099], shared], &[shared, [0, 0, 5]], &[[1, 1, 7]]]);
         assert!(two.contains("in 2 cells") && two.contains("points at (101.5, 104), (102, 100.5) have it"), "{two}");
-        assert!(two.contains("[input] nodata = -9999;"), "{two}");
+        assert!(two.contains("[input] nodata = -9999 if"), "{two}");
         let many: Vec<[i32; 3]> = (0..9).map(|n| [8 - n, n, -10_099]).collect();
         let said = warning(&[&many]);
         assert!(said.contains("points at (100, 104), (100.5, 103.5), (101, 103) and other places have it"), "{said}");
@@ -122,6 +121,6 @@ mod tests {
     #[test]
     fn a_height_that_no_point_has_is_no_row_to_leave_out() {
         let said = warning(&[&[[0, 0, -20_000], [5, 5, 0]]]);
-        assert!(said.contains("no point has this height") && !said.contains("[input]"), "{said}");
+        assert!(said.contains("between the heights of points") && !said.contains("[input]"), "{said}");
     }
 }

@@ -25,8 +25,8 @@ fn short(code: u32) -> Option<u16> {
 pub(crate) fn system_warning(crs: &Crs, system: &RasterSystem) -> Option<String> {
     (crs.is_named() && !system.is_placed()).then(|| {
         format!(
-            "terrain.tif does not say its CRS, {}: it has no EPSG code, and its text is missing or too long for the file; name it \
-             when you open the file",
+            "terrain.tif has no CRS: {} has no EPSG code, and its WKT is missing or too long for the file; fix: set the CRS where you \
+             open the file",
             crs.label()
         )
     })

@@ -134,9 +134,8 @@ fn batches(context: &LevelContext, tiles: Vec<usize>, threads: usize) -> Result<
 pub(crate) fn left_out_warning(plan: &Plan, levels: &LevelStats) -> Option<String> {
     (levels.left_out > 0).then(|| {
         format!(
-            "{} of {} coarser tiles are left out, because the tiles below them have too many vertices for [limits] memory = \"{}\": \
-             viewers load the finer ones at once; raise memory, lower [triangulation] max_points_per_tile, or cut less with \
-             [output] max_edge",
+            "{} of {} coarser tiles are left out for lack of memory ([limits] memory = \"{}\"): viewers load the finer ones at once; \
+             fix: more [limits] memory, or a lower [triangulation] max_points_per_tile",
             levels.left_out,
             levels.files + levels.left_out,
             plan.options.limits.memory

@@ -307,8 +307,8 @@ fn hull_warning(plan: &Plan, hull: HullCount) -> Option<String> {
     let HullCount { slivers, triangles } = hull;
     (plan.options.output.hull == Hull::Trimmed && hull.is_most()).then(|| {
         format!(
-            "nothing is left out along the hull: {} of {} triangles are slivers there; the points lie along a curve, or are few; \
-             [output] hull = \"whole\" says the same without this warning",
+            "no slivers are left out along the hull, because most of the mesh is slivers there ({} of {} triangles); fix: [output] hull \
+             = \"whole\" does the same without this warning",
             grouped(slivers),
             grouped(triangles)
         )
@@ -369,7 +369,11 @@ fn publish(
     let page_of_others = output.page && run.directory.has_page_of_others()?;
     if page_of_others {
         let page = run.directory.results().page();
-        warnings.push(format!("the page is not written: {} came during the job, and no job wrote it", page.display()));
+        warnings.push(format!(
+            "the page is not written: {} appeared during the job, and is not a page of gdt-batch; fix: remove it, and \
+         run the job again",
+            page.display()
+        ));
     }
     let lines = plan.built_breaklines()?;
     let content = SideFiles {
