@@ -22,6 +22,7 @@ mod layer;
 mod mesh;
 mod normals;
 mod place;
+mod refine;
 mod rough;
 mod side;
 #[cfg(test)]
