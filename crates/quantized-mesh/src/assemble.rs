@@ -24,8 +24,9 @@ pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
     }
     let area_of = |triangle: &[u32; 3]| double_area(triangle.map(|v| nodes[v as usize]));
     // Triangles that rounding has turned over have negative areas, so that the sum is that of the terrain.
-    let area: i64 = all.iter().map(area_of).sum();
-    let (mut kept, is_unfolded) = unfolded(&nodes, all);
+    let areas = all.iter().map(area_of);
+    let (area, is_upright) = areas.fold((0, true), |(sum, all), area| (sum + area, all && area > 0));
+    let (mut kept, is_unfolded) = if is_upright { (all, true) } else { unfolded(&nodes, all) };
     if kept.is_empty() {
         return None;
     }
@@ -107,6 +108,10 @@ fn is_on_side(nodes: &[Node], edge: [u32; 2]) -> bool {
 pub(crate) fn without_unused(nodes: Vec<Node>, triangles: &[[u32; 3]]) -> TileMesh {
     let mut is_used = vec![false; nodes.len()];
     triangles.iter().flatten().for_each(|&v| is_used[v as usize] = true);
+    if is_used.iter().all(|used| *used) {
+        let triangles = in_order(nodes.len(), triangles);
+        return TileMesh { nodes, triangles };
+    }
     let mut count = 0;
     let numbers: Vec<u32> = is_used
         .iter()

@@ -1,7 +1,7 @@
 //! The tile above four.
 //!
-//! Its vertices are selected from theirs ([`selection`]), those of its sides from those of their sides alone. So a tile needs no neighbour, and meets
-//! all of them.
+//! Its vertices are selected from theirs (`refine.rs`, or `rough.rs` where that would be too many), those of its sides from those of their sides
+//! alone. So a tile needs no neighbour, and meets all of them.
 
 use crate::bound::{FIRST_FLAT_ZOOM, steps};
 use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, in_order};

@@ -185,37 +185,35 @@ fn push_sides(bytes: &mut Vec<u8>, nodes: &[Node], is_long: bool) {
     }
 }
 
-/// Tiles of smaller zooms are so wide that directions at their ends do not tell those between.
-const FIRST_SMALL_ZOOM: u8 = 8;
+/// Tiles from this zoom on are so small that directions are the same everywhere in them, as far as two bytes tell.
+const FIRST_SMALL_ZOOM: u8 = 12;
 
 /// East, north and up in a tile, in earth-centred axes.
 struct EarthFrame {
     tile: Tile,
-    /// Sine and cosine of the longitude in the west and the east, and of the latitude in the south and the north.
-    ends: [[[f64; 2]; 2]; 2],
+    /// Sine and cosine of the longitude and of the latitude of its middle.
+    middle: [[f64; 2]; 2],
 }
 
 impl EarthFrame {
     fn new(tile: Tile) -> EarthFrame {
-        let ends = tile.south_west().map(|low| [circle(low), circle(low + tile.side())]);
-        EarthFrame { tile, ends }
+        EarthFrame { tile, middle: tile.south_west().map(|low| circle(low + tile.side() / 2.0)) }
     }
 
-    /// Returns about sine and cosine of longitude or latitude at a vertex.
-    fn circle(&self, axis: usize, along: u16) -> [f64; 2] {
-        let share = f64::from(along) / f64::from(LAST);
-        if self.tile.zoom < FIRST_SMALL_ZOOM {
-            return circle(self.tile.south_west()[axis] + self.tile.side() * share);
+    /// Returns about sine and cosine of longitude and latitude at a vertex.
+    fn circles(&self, node: Node) -> [[f64; 2]; 2] {
+        if self.tile.zoom >= FIRST_SMALL_ZOOM {
+            return self.middle;
         }
-        let [low, high] = self.ends[axis];
-        [0, 1].map(|k| low[k] + (high[k] - low[k]) * share)
+        let ([west, south], side) = (self.tile.south_west(), self.tile.side() / f64::from(LAST));
+        [circle(west + side * f64::from(node.u)), circle(south + side * f64::from(node.v))]
     }
 
     /// Returns about the direction of a normal in earth-centred axes, of any length.
     fn earth_centred(&self, node: Node, normal: [f32; 3]) -> [f64; 3] {
         // A vertex beside the terrain has no triangle of it.
         let [east, north, up] = if normal == [0.0; 3] { [0.0, 0.0, 1.0] } else { normal.map(f64::from) };
-        let ([sin_x, cos_x], [sin_y, cos_y]) = (self.circle(0, node.u), self.circle(1, node.v));
+        let [[sin_x, cos_x], [sin_y, cos_y]] = self.circles(node);
         let outwards = up * cos_y - north * sin_y;
         [outwards * cos_x - east * sin_x, outwards * sin_x + east * cos_x, north * cos_y + up * sin_y]
     }
@@ -224,8 +222,8 @@ impl EarthFrame {
 /// Returns a direction on an unfolded octahedron, in two bytes (Meyer et al. 2010; Cigolle et al. 2014, "A survey of efficient representations for
 /// independent unit vectors").
 fn octahedral([x, y, z]: [f64; 3]) -> [u8; 2] {
-    let sum = x.abs() + y.abs() + z.abs();
-    let [x, y] = [x / sum, y / sum];
+    let scale = 1.0 / (x.abs() + y.abs() + z.abs());
+    let [x, y] = [x * scale, y * scale];
     let folded = if z < 0.0 { [(1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)] } else { [x, y] };
     // From 0 on, so that the fraction is cut off.
     folded.map(|along| ((along * 0.5 + 0.5) * 255.0 + 0.5) as u8)

@@ -48,7 +48,8 @@ fn sums(mesh: &TileMesh, tile: Tile, triangles: impl Iterator<Item = [u32; 3]>) 
 
 /// Returns what a tile adds to the normals on its border.
 pub fn border_normals(mesh: &TileMesh, tile: Tile) -> Vec<BorderNormal> {
-    let is_at_border = |triangle: &[u32; 3]| triangle.iter().any(|&v| mesh.nodes[v as usize].is_on_border());
+    let is_on_border: Vec<bool> = mesh.nodes.iter().map(|node| node.is_on_border()).collect();
+    let is_at_border = |triangle: &[u32; 3]| triangle.iter().any(|&v| is_on_border[v as usize]);
     let at_border = mesh.triangles.iter().copied().filter(is_at_border);
     let on_border = mesh.nodes.iter().zip(sums(mesh, tile, at_border)).filter(|(node, _)| node.is_on_border());
     on_border.map(|(node, sum)| BorderNormal { place: [node.u, node.v], sum }).collect()

@@ -41,14 +41,9 @@ pub(crate) fn refined(
 ) -> Result<Refined, delaunay::Error> {
     let mut refinement = Refinement::new(first, points)?;
     let mut left = most;
-    let mut excess = None;
-    loop {
+    while left > 0 {
         let mut worst = refinement.exceeding(bound);
         if worst.is_empty() {
-            break;
-        }
-        if left == 0 {
-            excess = worst.iter().map(|proposed| proposed.distance).reduce(f64::max);
             break;
         }
         if worst.len() > left {
@@ -58,6 +53,8 @@ pub(crate) fn refined(
         left -= worst.len();
         refinement.insert_all(&worst);
     }
+    let greatest = refinement.held.iter().map(|held| held.distance).fold(0.0, f64::max);
+    let excess = (greatest > bound).then_some(greatest);
     let Refinement { sites, heights, mesh, .. } = refinement;
     let points = sites.iter().zip(heights).map(|([x, y], h)| [*x, *y, h]).collect();
     Ok(Refined { points, triangles: mesh.corners().to_vec(), excess })
@@ -200,5 +197,74 @@ impl<'a> Refinement<'a> {
             self.changed.push(triangle as u32);
         }
         triangle as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    const SIDE: i32 = 4_000;
+
+    /// Returns how far a point is from a mesh along the vertical.
+    fn distance(mesh: &Refined, [x, y, h]: [i32; 3]) -> f64 {
+        let over = |corners: &[u32; 3]| {
+            let corners = corners.map(|v| mesh.points[v as usize]);
+            let [a, b, c] = corners.map(|[x, y, _]| [x, y]);
+            let parts = [orient2d(b, c, [x, y]), orient2d(c, a, [x, y]), orient2d(a, b, [x, y])];
+            let whole: i64 = parts.iter().sum();
+            let height = (0..3).map(|k| parts[k] as f64 * f64::from(corners[k][2])).sum::<f64>() / whole as f64;
+            parts.iter().all(|part| *part >= 0).then_some((height - f64::from(h)).abs())
+        };
+        mesh.triangles.iter().find_map(over).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 80, ..ProptestConfig::default() })]
+
+        #[test]
+        fn all_points_are_within_the_bound_that_is_told(
+            places in prop::collection::btree_map((1..SIDE, 1..SIDE), -500..500i32, 0..400),
+            grid in prop::sample::select(vec![1, 50, 800]),
+            bound in prop::sample::select(vec![1.0, 100.0, 1000.0]),
+            most in prop::sample::select(vec![0usize, 7, 1000]),
+        ) {
+            let first = [[0, 0, 3], [SIDE, 0, -70], [0, SIDE, 20], [SIDE, SIDE, 400]];
+            let on_grid = |along: i32| (along / grid * grid).clamp(1, SIDE - 1);
+            let places: std::collections::BTreeMap<[i32; 2], i32> =
+                places.into_iter().map(|((x, y), h)| ([on_grid(x), on_grid(y)], h)).collect();
+            let points: Vec<[i32; 3]> = places.iter().map(|([x, y], h)| [*x, *y, *h]).collect();
+            let mesh = refined(&first, &points, bound, most).unwrap();
+            let farthest = points.iter().map(|point| distance(&mesh, *point)).fold(0.0, f64::max);
+            match mesh.excess {
+                None => prop_assert!(farthest <= bound + 1e-6),
+                Some(excess) => {
+                    prop_assert!(excess > bound && (farthest - excess).abs() < 1e-6);
+                    prop_assert!(mesh.points.len() >= 4 + most);
+                }
+            }
+            prop_assert!(mesh.points.len() <= 4 + most + points.len().div_ceil(POINTS_PER_SEED));
+            let known: BTreeSet<[i32; 3]> = first.into_iter().chain(points).collect();
+            prop_assert!(mesh.points.iter().all(|point| known.contains(point)));
+            let distinct: BTreeSet<&[i32; 3]> = mesh.points.iter().collect();
+            prop_assert_eq!(distinct.len(), mesh.points.len());
+            let sites: Vec<Site> = mesh.points.iter().map(|[x, y, _]| [*x, *y]).collect();
+            let sorted = |triangles: &[[u32; 3]]| -> BTreeSet<[u32; 3]> {
+                triangles.iter().map(|&triangle| crate::mesh::least_first(triangle)).collect()
+            };
+            prop_assert_eq!(sorted(canonical(&sites).unwrap().corners()), sorted(&mesh.triangles));
+        }
+    }
+
+    /// A plane needs no points but those that are selected in any case.
+    #[test]
+    fn a_plane_has_few_vertices() {
+        let plane = |x: i32, y: i32| [x, y, x + 2 * y];
+        let first = [plane(0, 0), plane(SIDE, 0), plane(0, SIDE), plane(SIDE, SIDE)];
+        let points: Vec<[i32; 3]> = (0..900).map(|i| plane(i % 30 * 100 + 1, i / 30 * 100 + 1)).collect();
+        let mesh = refined(&first, &points, 0.5, 1000).unwrap();
+        assert!(mesh.points.len() <= 4 + 900_usize.div_ceil(POINTS_PER_SEED) && mesh.excess.is_none());
     }
 }
