@@ -3,8 +3,8 @@
 use crate::cut::Piece;
 use crate::fill::{fill, planar};
 use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, double_area, in_order};
+use crate::number_hash::NumberMap;
 use crate::unfold::unfolded;
-use std::collections::HashMap;
 
 /// Twice the area of a tile in square steps.
 const WHOLE: i64 = 2 * (LAST as i64) * (LAST as i64);
@@ -82,7 +82,7 @@ fn has_all_on_border(nodes: &[Node], triangles: &[[u32; 3]]) -> bool {
 
 /// Returns the edges that only one of the triangles has, or more on one side than on the other, in order and with the triangles on their left.
 fn ends(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut counts: HashMap<[u32; 2], i32> = HashMap::new();
+    let mut counts: NumberMap<[u32; 2], i32> = NumberMap::default();
     for &[a, b, c] in triangles {
         for [from, to] in [[a, b], [b, c], [c, a]] {
             match from < to {

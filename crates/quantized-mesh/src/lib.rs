@@ -21,6 +21,7 @@ mod header;
 mod layer;
 mod mesh;
 mod normals;
+mod number_hash;
 mod place;
 mod refine;
 mod rough;

@@ -1,10 +1,10 @@
 //! Normals of the terrain at vertices, the same in all tiles that share one.
 
 use crate::mesh::{LAST, OUTSIDE, TileMesh};
+use crate::number_hash::NumberMap;
 use crate::place::{HEIGHT_STEPS, SPAN};
 use crate::tile::Tile;
 use bytemuck::{Pod, Zeroable};
-use std::collections::HashMap;
 
 /// The mean radius of the earth in metres. The scale of a tile needs no more.
 const RADIUS: f64 = 6_371_000.0;
@@ -68,7 +68,7 @@ pub(crate) fn normals(mesh: &TileMesh, tile: Tile, around: &[([i32; 2], Vec<Bord
     tiles.push(([0, 0], &own));
     // All tiles around a vertex add in the same order, so that they get the same bits.
     tiles.sort_by_key(|([east, north], _)| [*north, *east]);
-    let mut shared: HashMap<[u16; 2], [f32; 3]> = HashMap::new();
+    let mut shared: NumberMap<[u16; 2], [f32; 3]> = NumberMap::default();
     for (offset, border) in tiles {
         for normal in border {
             let moved = |axis: usize| {

@@ -221,6 +221,7 @@ proptest! {
             let tile = decode(&bytes).unwrap();
             prop_assert_eq!(tile.vertices.len(), mesh.nodes.len());
             prop_assert_eq!(tile.normals.len(), mesh.nodes.len());
+            prop_assert_eq!(tile.fault(), None);
             let heights: BTreeMap<[u16; 2], i32> = mesh.nodes.iter().map(|node| ([node.u, node.v], node.height(3))).collect();
             for (i, [u, v, _]) in tile.vertices.iter().enumerate() {
                 let off = tile.height(i) - f64::from(heights[&[*u, *v]]) / HEIGHT_STEPS;
@@ -264,6 +265,26 @@ proptest! {
             let count = tile.vertices.len() as u32;
             prop_assert!(tile.triangles.iter().flatten().chain(tile.sides.iter().flatten()).all(|v| *v < count));
         }
+    }
+}
+
+#[test]
+fn faults_of_a_mesh_are_found() {
+    let (place, mesh) = tiles(&terrain(8, 60, 50_000, 1), 1).pop_first().unwrap();
+    let surface = Surface { tile: Tile { zoom: ZOOM, x: place[0], y: place[1] }, mesh: &mesh, outside: 0, around: &[] };
+    let tile = decode(&encode(&surface, HeightSteps::over(300_000))).unwrap();
+    let faults = [
+        |tile: &mut DecodedTile| tile.triangles[0].swap(0, 1),
+        |tile: &mut DecodedTile| tile.triangles.truncate(tile.triangles.len() - 1),
+        |tile: &mut DecodedTile| tile.sides[1].truncate(1),
+        |tile: &mut DecodedTile| tile.sides[2].reverse(),
+        |tile: &mut DecodedTile| tile.sides.swap(0, 2),
+    ];
+    assert_eq!(tile.fault(), None);
+    for (number, make) in faults.iter().enumerate() {
+        let mut broken = tile.clone();
+        make(&mut broken);
+        assert!(broken.fault().is_some(), "{number}");
     }
 }
 
