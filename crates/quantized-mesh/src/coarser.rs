@@ -72,9 +72,11 @@ fn candidates(children: &[Child]) -> [Vec<Node>; 2] {
     [on_border, inside].map(each_once)
 }
 
-/// Returns where a vertex of a child lies in its parent, if it lies on the border of that.
+/// Returns where a vertex of a child lies in its parent, if it lies on the border of that. Only what lies at a corner comes to lie there.
 fn halved_on_border(steps: u16, half: u8) -> u16 {
-    ((u32::from(steps) + u32::from(half) * u32::from(LAST)) / 2) as u16
+    let doubled = u32::from(steps) + u32::from(half) * u32::from(LAST);
+    let halved = (doubled / 2) as u16;
+    if doubled == 0 || doubled == 2 * u32::from(LAST) { halved } else { halved.clamp(1, LAST - 1) }
 }
 
 /// Returns where it lies otherwise: not on the border. Vertices stay in order, but for a few that would be on the border.

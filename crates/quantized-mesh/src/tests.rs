@@ -210,6 +210,29 @@ proptest! {
         }
     }
 
+    /// Vertices that are a few steps from a corner of four tiles, and from their sides.
+    #[test]
+    fn coarser_tiles_meet_where_vertices_are_dense(
+        seed in 0u64..1 << 40,
+        count in 1usize..300,
+        reach in prop::sample::select(vec![3i64, 20, 2_000, 40_000]),
+    ) {
+        let mut finer = tiles(&terrain_with_pairs(seed, count, reach, 1, 4), 1);
+        for zoom in (ZOOM - 3..ZOOM).rev() {
+            let mut children: BTreeMap<[i32; 2], Vec<Child>> = BTreeMap::new();
+            for ([x, y], mesh) in finer {
+                let child = Child { quadrant: [(x & 1) as u8, (y & 1) as u8], nodes: mesh.nodes };
+                children.entry([x >> 1, y >> 1]).or_default().push(child);
+            }
+            let make = |([x, y], children): ([i32; 2], Vec<Child>)| {
+                ([x, y], coarser(Tile { zoom, x, y }, &children, 0).unwrap().0)
+            };
+            finer = children.into_iter().map(make).collect();
+            finer.values().for_each(check_whole);
+            check_meeting(&finer);
+        }
+    }
+
     #[test]
     fn tiles_come_back_from_their_bytes(seed in 0u64..1 << 40, count in 1usize..300, range in 1i64..1 << 20) {
         let mut terrain = terrain(seed, count, 50_000, 1);
