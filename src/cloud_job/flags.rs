@@ -17,7 +17,7 @@ pub(crate) struct Flag {
 }
 
 /// The flags that are lines of a configuration and no paths.
-const FLAGS: [Flag; 11] = [
+const FLAGS: [Flag; 12] = [
     Flag { name: "surface", table: "input", key: "surface", value: |given| text(&given.surface) },
     Flag {
         name: "bounds",
@@ -39,6 +39,7 @@ const FLAGS: [Flag; 11] = [
     Flag { name: "raster", table: "output", key: "raster", value: |given| given.raster.map(raster) },
     Flag { name: "export", table: "output", key: "export", value: |given| words(&given.export) },
     Flag { name: "contours", table: "output", key: "contours", value: |given| given.contours.map(contours) },
+    Flag { name: "terrain", table: "output", key: "terrain", value: |given| given.terrain.then(terrain) },
 ];
 
 /// The flags that are paths: the configuration counts them from its own folder.
@@ -76,6 +77,10 @@ fn raster(resolution: f64) -> Value {
 
 fn contours(interval: f64) -> Value {
     toml::Table::from_iter([("interval".to_string(), Value::Float(interval))]).into()
+}
+
+fn terrain() -> Value {
+    toml::Table::from_iter([("format".to_string(), Value::from("quantized-mesh"))]).into()
 }
 
 impl Flag {

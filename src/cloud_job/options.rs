@@ -28,6 +28,9 @@ pub struct CloudOptions {
     /// Also write contour lines as contours.gpkg, with this height from one to the next, in the unit of heights.
     #[arg(long, value_name = "INTERVAL", value_parser = number, allow_negative_numbers = true)]
     pub contours: Option<f64>,
+    /// Also write terrain tiles for globes such as CesiumJS to terrain/. They need --height-offset if heights are above sea level.
+    #[arg(long)]
+    pub terrain: bool,
     /// Keep only the points in this rectangle, in the coordinates of the files; with --to-crs, in those of that system.
     #[arg(long, value_name = "XMIN,YMIN,XMAX,YMAX", allow_hyphen_values = true)]
     pub bounds: Option<Bounds>,

@@ -49,7 +49,10 @@ fn a_job_has_the_bytes_of_its_configuration() {
         (&["my tiles", "cloud.copc.las", "-o", "out/of two", "--to-crs", "EPSG:25833"], "out/of two"),
         // What the clouds need is set in both.
         (&["degrees.csv"], "degrees-terrain"),
-        (&["degrees.csv", "--to-crs", "EPSG:32633", "--raster", "500", "--contours", "0.5"], "degrees-terrain"),
+        (
+            &["degrees.csv", "--to-crs", "EPSG:32633", "--raster", "500", "--contours", "0.5", "--terrain"],
+            "degrees-terrain",
+        ),
     ] {
         gdt_batch(root, &[words, &["--quiet"]].concat()).succeeded();
         let own = results(&root.join(out));
@@ -65,6 +68,7 @@ fn a_job_has_the_bytes_of_its_configuration() {
         }
         assert_eq!(own.contains("terrain.tif"), words.contains(&"--raster"), "{words:?}");
         assert_eq!(own.contains("terrain.ply"), words.contains(&"--export"), "{words:?}");
+        assert_eq!(own.contains("terrain/layer.json"), words.contains(&"--terrain"), "{words:?}");
     }
 }
 
@@ -103,6 +107,7 @@ fn the_written_configuration_has_the_flags_and_offers_none_of_them_again() {
         "--export",
         "landxml",
         "--export=dxf",
+        "--terrain",
     ];
     let words = [&["my tiles", "--bounds", "-1,2,3e6,4e7", "--write-config", "-"], &flags[..]].concat();
     let text = gdt_batch(root, &words).succeeded().out;
@@ -114,6 +119,7 @@ fn the_written_configuration_has_the_flags_and_offers_none_of_them_again() {
         "raster = { resolution = 1.0 }",
         "export = [\"landxml\", \"dxf\"]",
         "contours = { interval = 2.0 }",
+        "terrain = { format = \"quantized-mesh\" }",
         "directory = \"my tiles-terrain\"",
         "files = [\"my tiles/*.laz\"]",
     ] {

@@ -5,6 +5,7 @@ mod clicks;
 mod looks;
 mod map_tiles;
 mod rig;
+mod terrain_tiles;
 
 use std::process::Command;
 

@@ -1,6 +1,6 @@
 //! What the tests of the page have in common: terrains, the server, a map service, Chromium, and pictures of the page.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -158,6 +158,17 @@ impl Server {
         let url = line.trim_end().to_owned();
         assert!(url.starts_with("http://127.0.0.1:"), "{line}");
         Server { program, url }
+    }
+
+    /// Returns the head and the body of the answer to a request for the path `target`.
+    pub(crate) fn answer(&self, target: &str) -> (String, Vec<u8>) {
+        let host = self.url.trim_start_matches("http://").trim_end_matches('/');
+        let mut stream = TcpStream::connect(host).unwrap();
+        write!(stream, "GET {target} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        let end = answer.windows(4).position(|four| four == b"\r\n\r\n").unwrap();
+        (String::from_utf8(answer[..end].to_vec()).unwrap(), answer[end + 4..].to_vec())
     }
 
     /// Returns the status of the answer to a request for the path `target`, letter by letter.

@@ -3,8 +3,8 @@
 use crate::cut::Piece;
 use crate::fill::{fill, planar};
 use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, double_area, in_order};
+use crate::number_hash::NumberMap;
 use crate::unfold::unfolded;
-use std::collections::HashMap;
 
 /// Twice the area of a tile in square steps.
 const WHOLE: i64 = 2 * (LAST as i64) * (LAST as i64);
@@ -24,8 +24,9 @@ pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
     }
     let area_of = |triangle: &[u32; 3]| double_area(triangle.map(|v| nodes[v as usize]));
     // Triangles that rounding has turned over have negative areas, so that the sum is that of the terrain.
-    let area: i64 = all.iter().map(area_of).sum();
-    let (mut kept, is_unfolded) = unfolded(&nodes, all);
+    let areas = all.iter().map(area_of);
+    let (area, is_upright) = areas.fold((0, true), |(sum, all), area| (sum + area, all && area > 0));
+    let (mut kept, is_unfolded) = if is_upright { (all, true) } else { unfolded(&nodes, all) };
     if kept.is_empty() {
         return None;
     }
@@ -81,7 +82,7 @@ fn has_all_on_border(nodes: &[Node], triangles: &[[u32; 3]]) -> bool {
 
 /// Returns the edges that only one of the triangles has, or more on one side than on the other, in order and with the triangles on their left.
 fn ends(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut counts: HashMap<[u32; 2], i32> = HashMap::new();
+    let mut counts: NumberMap<[u32; 2], i32> = NumberMap::default();
     for &[a, b, c] in triangles {
         for [from, to] in [[a, b], [b, c], [c, a]] {
             match from < to {
@@ -107,6 +108,10 @@ fn is_on_side(nodes: &[Node], edge: [u32; 2]) -> bool {
 pub(crate) fn without_unused(nodes: Vec<Node>, triangles: &[[u32; 3]]) -> TileMesh {
     let mut is_used = vec![false; nodes.len()];
     triangles.iter().flatten().for_each(|&v| is_used[v as usize] = true);
+    if is_used.iter().all(|used| *used) {
+        let triangles = in_order(nodes.len(), triangles);
+        return TileMesh { nodes, triangles };
+    }
     let mut count = 0;
     let numbers: Vec<u32> = is_used
         .iter()

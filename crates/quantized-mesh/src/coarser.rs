@@ -1,17 +1,16 @@
 //! The tile above four.
 //!
-//! Its vertices are selected from theirs ([`selection`]), those of its sides from those of their sides alone. So a tile needs no neighbour, and meets
-//! all of them.
+//! Its vertices are selected from theirs (`refine.rs`, or `rough.rs` where that would be too many), those of its sides from those of their sides
+//! alone. So a tile needs no neighbour, and meets all of them.
 
 use crate::bound::{FIRST_FLAT_ZOOM, steps};
 use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, in_order};
+use crate::refine::refined;
 use crate::rough::Cells;
 use crate::side::selected_along;
 use crate::tile::Tile;
-use delaunay::geometry::{Bounds, Site};
-use delaunay::mesh::half_edge::HalfEdgeMesh;
+use delaunay::geometry::Site;
 use delaunay::triangulation::canonical;
-use selection::{BlockPoints, ErrorBound, PointSource, select_down};
 use std::collections::BTreeMap;
 
 /// A tile of the next finer zoom.
@@ -19,12 +18,12 @@ use std::collections::BTreeMap;
 pub struct Child {
     /// 1 in the east, 0 in the west; 1 in the north, 0 in the south.
     pub quadrant: [u8; 2],
-    /// Its vertices.
+    /// Its vertices, in the order of a mesh.
     pub nodes: Vec<Node>,
 }
 
 /// The most vertices of a coarser tile, besides those along its sides. Where the bound of its zoom would select more, as in woods, a greater one holds.
-const MOST_VERTICES: u64 = 16_384;
+const MOST_VERTICES: usize = 16_384;
 
 /// The steps of the sides of a square that stand for one metre, or for as much in the other direction.
 const SCALE: i32 = 1024;
@@ -35,15 +34,13 @@ const SCALE: i32 = 1024;
 /// # Errors
 /// [`delaunay::Error::Stopped`].
 pub fn coarser(tile: Tile, children: &[Child], outside: i32) -> Result<(TileMesh, u64), delaunay::Error> {
-    let candidates = candidates(children);
-    let (on_border, inside): (Vec<Node>, Vec<Node>) = candidates.into_iter().partition(|node| node.is_on_border());
+    let [on_border, inside] = candidates(children);
     let mut fixed = border(&on_border, tile.zoom, outside);
     fixed.extend(grid(&inside, &fixed, tile.zoom));
     fixed.sort_unstable_by_key(|node| node.order());
     fixed.dedup_by_key(|node| node.order());
     let source = TileSource { tile, fixed: &fixed, inside: &inside, outside };
-    let (vertices, bound) = source.vertices()?;
-    Ok((source.mesh_of(vertices)?, bound))
+    source.mesh()
 }
 
 /// Returns a tile that the terrain does not reach.
@@ -51,25 +48,60 @@ pub fn flat(tile: Tile) -> Result<TileMesh, delaunay::Error> {
     coarser(tile, &[], 0).map(|(mesh, _)| mesh)
 }
 
-/// Returns the vertices of all children as a tile of the zoom before has them, in order. Of those that come together the highest of the terrain stays.
-fn candidates(children: &[Child]) -> Vec<Node> {
-    let mut all = Vec::new();
-    for child in children {
-        let along = |steps: u16, half: u8| {
-            let doubled = u32::from(steps) + u32::from(half) * u32::from(LAST);
-            let halved = (doubled / 2) as u16;
-            // Only what lies on the border comes to lie on it.
-            if doubled == 0 || doubled == 2 * u32::from(LAST) { halved } else { halved.clamp(1, LAST - 1) }
-        };
-        all.extend(child.nodes.iter().map(|node| Node {
-            u: along(node.u, child.quadrant[0]),
-            v: along(node.v, child.quadrant[1]),
-            h: node.h,
-        }));
+/// Returns the vertices of all children as a tile of the zoom before has them, those on its border and the others, in order. Of those that come together
+/// the highest of the terrain stays.
+fn candidates(children: &[Child]) -> [Vec<Node>; 2] {
+    let [mut on_border, mut inside] = [Vec::new(), Vec::new()];
+    let has = |quadrant: [u8; 2]| children.iter().any(|child| child.quadrant == quadrant);
+    let mut ordered: Vec<&Child> = children.iter().collect();
+    ordered.sort_by_key(|child| [child.quadrant[1], child.quadrant[0]]);
+    for Child { quadrant: [east, north], nodes } in ordered {
+        let [west_has, south_has] = [*east == 1 && has([0, *north]), *north == 1 && has([*east, 0])];
+        for node in nodes {
+            let is_outer = |along: u16, half: u8| along == if half == 0 { 0 } else { LAST };
+            if is_outer(node.u, *east) || is_outer(node.v, *north) {
+                let [u, v] = [(node.u, *east), (node.v, *north)].map(|(along, half)| halved_on_border(along, half));
+                on_border.push(Node { u, v, h: node.h });
+            } else if !(west_has && node.u == 0 || south_has && node.v == 0) {
+                let [u, v] = [(node.u, *east), (node.v, *north)].map(|(along, half)| halved_inside(along, half));
+                inside.push(Node { u, v, h: node.h });
+            }
+        }
     }
-    all.sort_unstable_by_key(|node| (node.order(), std::cmp::Reverse(node.h)));
-    all.dedup_by_key(|node| node.order());
-    all
+    on_border.sort_unstable_by_key(|node| node.order());
+    [on_border, inside].map(each_once)
+}
+
+/// Returns where a vertex of a child lies in its parent, if it lies on the border of that. Only what lies at a corner comes to lie there.
+fn halved_on_border(steps: u16, half: u8) -> u16 {
+    let doubled = u32::from(steps) + u32::from(half) * u32::from(LAST);
+    let halved = (doubled / 2) as u16;
+    if doubled == 0 || doubled == 2 * u32::from(LAST) { halved } else { halved.clamp(1, LAST - 1) }
+}
+
+/// Returns where it lies otherwise: not on the border. Vertices stay in order, but for a few that would be on the border.
+fn halved_inside(steps: u16, half: u8) -> u16 {
+    (steps / 2 + u16::from(half) * LAST.div_ceil(2)).clamp(1, LAST - 1)
+}
+
+/// Puts nodes that are nearly in order into it, each place once.
+fn each_once(mut nodes: Vec<Node>) -> Vec<Node> {
+    let mut orders: Vec<u32> = nodes.iter().map(|node| node.order()).collect();
+    for i in 1..nodes.len() {
+        let (node, order) = (nodes[i], orders[i]);
+        let mut at = i;
+        while at > 0 && orders[at - 1] > order {
+            (nodes[at], orders[at]) = (nodes[at - 1], orders[at - 1]);
+            at -= 1;
+        }
+        (nodes[at], orders[at]) = (node, order);
+    }
+    nodes.dedup_by(|node, known| {
+        let is_same = [node.u, node.v] == [known.u, known.v];
+        known.h = if is_same { known.h.max(node.h) } else { known.h };
+        is_same
+    });
+    nodes
 }
 
 /// Returns the vertices along the sides: selected ones of `on_border`, and the corners.
@@ -173,10 +205,10 @@ impl TileSource<'_> {
         [i32::from(node.u) * x, i32::from(node.v) * y, node.height(self.outside)]
     }
 
-    /// Returns the vertices of the tile, and their bound.
-    fn vertices(&self) -> Result<(Vec<Node>, u64), delaunay::Error> {
+    /// Returns the mesh of the tile, and how far vertices are from it.
+    fn mesh(&self) -> Result<(TileMesh, u64), delaunay::Error> {
         match self.medians() {
-            Some(medians) => Ok((medians, self.range())),
+            Some(medians) => Ok((self.mesh_of(medians)?, self.range())),
             None => self.selected(),
         }
     }
@@ -184,32 +216,31 @@ impl TileSource<'_> {
     /// Returns a vertex for each cell of the tile, and the fixed ones, where the surface is so rough that the bound would select far more vertices than a
     /// tile may have.
     fn medians(&self) -> Option<Vec<Node>> {
-        if self.inside.len() as u64 <= MOST_VERTICES {
+        if self.inside.len() <= MOST_VERTICES {
             return None;
         }
-        let (beside, ground): (Vec<Node>, Vec<Node>) = self.inside.iter().partition(|node| node.h == OUTSIDE);
-        let cells = Cells::new(&ground);
-        let is_rough = cells.off_plane(2 * steps(self.tile.zoom)) as u64 > MOST_VERTICES / 2;
+        let cells = Cells::new(self.inside);
+        let is_rough = cells.off_plane(2 * steps(self.tile.zoom)) > MOST_VERTICES / 2;
         is_rough.then(|| {
             let mut medians = cells.medians();
-            medians.extend(beside);
+            medians.extend(self.inside.iter().filter(|node| node.h == OUTSIDE));
             medians.retain(|node| !self.is_fixed(node));
             medians.extend(self.fixed);
             medians
         })
     }
 
-    /// Returns the vertices that the bound of the zoom selects, or a greater one if these would be too many.
-    fn selected(&self) -> Result<(Vec<Node>, u64), delaunay::Error> {
-        let ladder = self.ladder();
-        let bounds: Vec<ErrorBound> = ladder.iter().map(|&steps| ErrorBound::new(steps, 1)).collect();
-        let (selected, kept) = select_down(self, &bounds, MOST_VERTICES)?;
-        let kept = ladder.iter().zip(&bounds).find(|(_, bound)| Some(**bound) == kept).map(|(steps, _)| *steps);
+    /// Returns the mesh of the vertices that the bound of the zoom selects, and this bound, or a greater one if these would be too many.
+    fn selected(&self) -> Result<(TileMesh, u64), delaunay::Error> {
+        let bound = steps(self.tile.zoom);
+        let first: Vec<[i32; 3]> = self.fixed.iter().map(|node| self.point(node)).collect();
+        let points: Vec<[i32; 3]> =
+            self.inside.iter().filter(|node| !self.is_fixed(node)).map(|node| self.point(node)).collect();
+        let refined = refined(&first, &points, bound as f64, MOST_VERTICES)?;
         let [x, y] = self.scale();
-        let all = Bounds { min: [0, 0], max: [i32::from(LAST) * x, i32::from(LAST) * y] };
-        let nodes =
-            selected.within(all).map(|[px, py, h]| Node { u: (px / x) as u16, v: (py / y) as u16, h }).collect();
-        Ok((nodes, kept.unwrap_or_else(|| self.range())))
+        let nodes = refined.points.iter().map(|[px, py, h]| Node { u: (px / x) as u16, v: (py / y) as u16, h: *h });
+        let mesh = self.in_order(nodes.collect(), &refined.triangles);
+        Ok((mesh, refined.excess.map_or(bound, |excess| libm::ceil(excess) as u64)))
     }
 
     fn is_fixed(&self, node: &Node) -> bool {
@@ -219,18 +250,31 @@ impl TileSource<'_> {
     }
 
     /// Returns the mesh of vertices.
-    fn mesh_of(&self, mut nodes: Vec<Node>) -> Result<TileMesh, delaunay::Error> {
-        nodes.sort_unstable_by_key(|node| node.order());
+    fn mesh_of(&self, nodes: Vec<Node>) -> Result<TileMesh, delaunay::Error> {
         let [x, y] = self.scale();
         let sites: Vec<Site> = nodes.iter().map(|node| [i32::from(node.u) * x, i32::from(node.v) * y]).collect();
         let mesh = canonical(&sites)?;
-        let triangles = in_order(nodes.len(), mesh.corners());
+        Ok(self.in_order(nodes, mesh.corners()))
+    }
+
+    /// Returns a mesh with its vertices and triangles in order.
+    fn in_order(&self, mut nodes: Vec<Node>, triangles: &[[u32; 3]]) -> TileMesh {
+        let mut order: Vec<u64> = (0..).zip(&nodes).map(|(v, node)| u64::from(node.order()) << 32 | v).collect();
+        order.sort_unstable();
+        let mut numbers = vec![0u32; nodes.len()];
+        (0..).zip(&order).for_each(|(number, key)| numbers[*key as u32 as usize] = number);
+        let triangles: Vec<[u32; 3]> = triangles.iter().map(|corners| corners.map(|v| numbers[v as usize])).collect();
+        nodes = order.iter().map(|key| nodes[*key as u32 as usize]).collect();
         // Heights beside the terrain are again those of the surroundings, whatever these are at the next zoom.
         let all = self.fixed.iter().chain(self.inside);
         let mut outside: Vec<u32> = all.filter(|node| node.h == OUTSIDE).map(|node| node.order()).collect();
-        outside.sort_unstable();
-        nodes.iter_mut().filter(|node| outside.binary_search(&node.order()).is_ok()).for_each(|node| node.h = OUTSIDE);
-        Ok(TileMesh { nodes, triangles })
+        if !outside.is_empty() {
+            outside.sort_unstable();
+            let is_outside = |node: &&mut Node| outside.binary_search(&node.order()).is_ok();
+            nodes.iter_mut().filter(is_outside).for_each(|node| node.h = OUTSIDE);
+        }
+        let triangles = in_order(nodes.len(), &triangles);
+        TileMesh { nodes, triangles }
     }
 
     /// Returns the lowest and the highest height apart.
@@ -238,49 +282,5 @@ impl TileSource<'_> {
         let heights = self.fixed.iter().chain(self.inside).map(|node| node.height(self.outside));
         let [low, high] = heights.fold([i32::MAX, i32::MIN], |[low, high], h| [low.min(h), high.max(h)]);
         if low > high { 0 } else { high.abs_diff(low).into() }
-    }
-
-    /// Returns bounds from one that few vertices exceed down to that of the zoom, in steps.
-    fn ladder(&self) -> Vec<u64> {
-        const FACTOR: u64 = 4;
-        let (last, range) = (steps(self.tile.zoom).max(1), self.range());
-        let mut ladder: Vec<u64> = std::iter::successors(Some(last), |bound| Some(bound * FACTOR))
-            .take_while(|bound| *bound < range / FACTOR)
-            .collect();
-        if ladder.is_empty() {
-            ladder.push(last);
-        }
-        ladder.reverse();
-        ladder
-    }
-}
-
-impl PointSource for TileSource<'_> {
-    type Error = delaunay::Error;
-
-    fn blocks(&self) -> usize {
-        1
-    }
-
-    fn load(&self, _: usize) -> Result<BlockPoints, delaunay::Error> {
-        let fixed: Vec<[i32; 3]> = self.fixed.iter().map(|node| self.point(node)).collect();
-        let inside = self.inside.iter().filter(|node| !self.is_fixed(node)).map(|node| self.point(node));
-        Ok(BlockPoints { points: inside.chain(fixed.iter().copied()).collect(), fixed })
-    }
-
-    fn triangulate(&self, sites: &[Site]) -> Result<HalfEdgeMesh, delaunay::Error> {
-        canonical(sites)
-    }
-
-    fn keeps_blocks(&self, _: u64, _: u64) -> bool {
-        true
-    }
-
-    fn asks_about(&self, _: [Site; 3]) -> bool {
-        false
-    }
-
-    fn after_round(&self, _: u32, _: u64) -> Result<(), delaunay::Error> {
-        Ok(())
     }
 }

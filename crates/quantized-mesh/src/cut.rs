@@ -5,8 +5,8 @@
 //! fractions.
 
 use crate::mesh::{LAST, Node};
+use crate::number_hash::NumberMap;
 use crate::place::{GridPoint, SPAN};
-use std::collections::HashMap;
 
 /// What a set of triangles leaves in a tile.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub struct Piece {
 
 /// Clips a mesh to tiles. Returns the pieces by column and row of their tiles.
 pub fn cut(points: &[GridPoint], triangles: &[[u32; 3]]) -> Vec<([i32; 2], Piece)> {
-    let mut cutter = Cutter { points, numbers: HashMap::new(), pieces: Vec::new() };
+    let mut cutter = Cutter { points, numbers: NumberMap::default(), pieces: Vec::new() };
     let tile_of = |point: &GridPoint| [point.x.div_euclid(SPAN) as i32, point.y.div_euclid(SPAN) as i32];
     let places: Vec<([i32; 2], bool)> =
         points.iter().map(|point| (tile_of(point), point.x % SPAN != 0 && point.y % SPAN != 0)).collect();
@@ -75,7 +75,7 @@ fn node(tile: [i32; 2], point: &GridPoint) -> Node {
 struct Cutter<'a> {
     points: &'a [GridPoint],
     /// The numbers of the pieces.
-    numbers: HashMap<[i32; 2], usize>,
+    numbers: NumberMap<[i32; 2], usize>,
     pieces: Vec<([i32; 2], Piece)>,
 }
 

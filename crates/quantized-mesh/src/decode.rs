@@ -25,6 +25,46 @@ impl DecodedTile {
         let share = f64::from(self.vertices[vertex][2]) / f64::from(LAST);
         low + (high - low) * share
     }
+
+    /// Returns the vertices of the west, south, east or north side: where along it, and at which height in metres.
+    pub fn side(&self, side: usize) -> impl Iterator<Item = (u16, f64)> {
+        let along = if side.is_multiple_of(2) { 1 } else { 0 };
+        self.sides[side].iter().map(move |&v| (self.vertices[v as usize][along], self.height(v as usize)))
+    }
+
+    /// Returns what is wrong with the mesh, if it does not cover the tile or does not name the vertices of its sides.
+    pub fn fault(&self) -> Option<&'static str> {
+        let place = |v: u32| {
+            let [u, v, _] = self.vertices[v as usize];
+            [u, v].map(i64::from)
+        };
+        let double_area = |corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(place);
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        };
+        let (mut sum, mut is_upright) = (0, true);
+        for area in self.triangles.iter().map(double_area) {
+            sum += area;
+            is_upright &= area > 0;
+        }
+        if !is_upright {
+            return Some("a triangle is turned over or flat");
+        }
+        if sum != 2 * i64::from(LAST) * i64::from(LAST) {
+            return Some("its triangles do not cover it");
+        }
+        (0..4).find_map(|side| self.fault_of_side(side))
+    }
+
+    fn fault_of_side(&self, side: usize) -> Option<&'static str> {
+        let (across, end) = (side % 2, if side < 2 { 0 } else { LAST });
+        let is_there = |v: &u32| self.vertices[*v as usize][across] == end;
+        let along: Vec<u16> = self.side(side).map(|(along, _)| along).collect();
+        let count = self.vertices.iter().filter(|vertex| vertex[across] == end).count();
+        let is_whole =
+            self.sides[side].iter().all(is_there) && along.is_sorted_by(|a, b| a < b) && along.len() == count;
+        (!is_whole).then_some("the list of the vertices of a side is wrong")
+    }
 }
 
 /// Why bytes are no tile.

@@ -1,6 +1,6 @@
 //! The bytes of a tile: quantized-mesh 1.0, with normals.
 
-use crate::header::{Header, circle, length};
+use crate::header::{Header, circle};
 use crate::mesh::{LAST, Node, TileMesh};
 use crate::normals::{BorderNormal, normals};
 use crate::place::HEIGHT_STEPS;
@@ -61,23 +61,21 @@ pub fn encode(surface: &Surface, steps: HeightSteps) -> Vec<u8> {
         bytes.resize(bytes.len().next_multiple_of(4), 0);
     }
     bytes.extend((order.triangles.len() as u32).to_le_bytes());
-    let mut push = |number: u32| match is_long {
-        true => bytes.extend(number.to_le_bytes()),
-        false => bytes.extend((number as u16).to_le_bytes()),
-    };
     let mut highest = 0;
-    for &v in order.triangles.iter().flatten() {
-        push(highest - v);
-        highest += u32::from(v == highest);
-    }
+    let back = order.triangles.as_flattened().iter().map(|&v| {
+        let back = highest - v;
+        highest += u32::from(back == 0);
+        back
+    });
+    push_numbers(&mut bytes, back, is_long);
     push_sides(&mut bytes, &nodes, is_long);
     let normals = normals(mesh, tile, surface.around);
     let frame = EarthFrame::new(tile);
     bytes.push(NORMALS);
     bytes.extend((2 * nodes.len() as u32).to_le_bytes());
-    for (&v, node) in order.vertices.iter().zip(&nodes) {
-        bytes.extend(octahedral(frame.earth_centred(*node, normals[v as usize])));
-    }
+    let directions =
+        order.vertices.iter().zip(&nodes).map(|(&v, node)| frame.earth_centred(*node, normals[v as usize]));
+    bytes.extend(directions.map(octahedral).collect::<Vec<[u8; 2]>>().as_flattened());
     bytes
 }
 
@@ -157,10 +155,21 @@ fn head(tile: Tile, heights: [f64; 2]) -> Vec<u8> {
 /// Adds each number as the difference to the one before, the sign in the last bit.
 fn push_differences(bytes: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
     let mut last = 0;
-    for number in numbers {
+    let differences = numbers.map(|number| {
         let difference = number - last;
         last = number;
-        bytes.extend((((difference << 1) ^ (difference >> 31)) as u16).to_le_bytes());
+        (((difference << 1) ^ (difference >> 31)) as u16).to_le_bytes()
+    });
+    bytes.extend(differences.collect::<Vec<[u8; 2]>>().as_flattened());
+}
+
+/// Adds numbers of two bytes, or four.
+fn push_numbers(bytes: &mut Vec<u8>, numbers: impl Iterator<Item = u32>, is_long: bool) {
+    match is_long {
+        true => bytes.extend(numbers.map(u32::to_le_bytes).collect::<Vec<[u8; 4]>>().as_flattened()),
+        false => {
+            bytes.extend(numbers.map(|number| (number as u16).to_le_bytes()).collect::<Vec<[u8; 2]>>().as_flattened())
+        }
     }
 }
 
@@ -172,62 +181,50 @@ fn push_sides(bytes: &mut Vec<u8>, nodes: &[Node], is_long: bool) {
         let mut along: Vec<(u16, u32)> = along.collect();
         along.sort_unstable();
         bytes.extend((along.len() as u32).to_le_bytes());
-        for (_, v) in along {
-            match is_long {
-                true => bytes.extend(v.to_le_bytes()),
-                false => bytes.extend((v as u16).to_le_bytes()),
-            }
-        }
+        push_numbers(bytes, along.into_iter().map(|(_, v)| v), is_long);
     }
 }
 
-/// Tiles of smaller zooms are so wide that directions at their ends do not tell those between.
-const FIRST_SMALL_ZOOM: u8 = 8;
+/// Tiles from this zoom on are so small that directions are the same everywhere in them, as far as two bytes tell.
+const FIRST_SMALL_ZOOM: u8 = 12;
 
 /// East, north and up in a tile, in earth-centred axes.
 struct EarthFrame {
     tile: Tile,
-    /// Sine and cosine of the longitude in the west and the east, and of the latitude in the south and the north.
-    ends: [[[f64; 2]; 2]; 2],
+    /// Sine and cosine of the longitude and of the latitude of its middle.
+    middle: [[f64; 2]; 2],
 }
 
 impl EarthFrame {
     fn new(tile: Tile) -> EarthFrame {
-        let ends = tile.south_west().map(|low| [circle(low), circle(low + tile.side())]);
-        EarthFrame { tile, ends }
+        EarthFrame { tile, middle: tile.south_west().map(|low| circle(low + tile.side() / 2.0)) }
     }
 
-    /// Returns about sine and cosine of longitude or latitude at a vertex.
-    fn circle(&self, axis: usize, along: u16) -> [f64; 2] {
-        let share = f64::from(along) / f64::from(LAST);
-        if self.tile.zoom < FIRST_SMALL_ZOOM {
-            return circle(self.tile.south_west()[axis] + self.tile.side() * share);
+    /// Returns about sine and cosine of longitude and latitude at a vertex.
+    fn circles(&self, node: Node) -> [[f64; 2]; 2] {
+        if self.tile.zoom >= FIRST_SMALL_ZOOM {
+            return self.middle;
         }
-        let [low, high] = self.ends[axis];
-        [0, 1].map(|k| low[k] + (high[k] - low[k]) * share)
+        let ([west, south], side) = (self.tile.south_west(), self.tile.side() / f64::from(LAST));
+        [circle(west + side * f64::from(node.u)), circle(south + side * f64::from(node.v))]
     }
 
-    /// Returns the direction of a normal in earth-centred axes, as long as one.
-    fn earth_centred(&self, node: Node, [east, north, up]: [f32; 3]) -> [f64; 3] {
-        let [east, north, up] = [east, north, up].map(f64::from);
-        let length_of = length([east, north, up]);
+    /// Returns about the direction of a normal in earth-centred axes, of any length.
+    fn earth_centred(&self, node: Node, normal: [f32; 3]) -> [f64; 3] {
         // A vertex beside the terrain has no triangle of it.
-        let [east, north, up] =
-            if length_of > 0.0 { [east, north, up].map(|along| along / length_of) } else { [0.0, 0.0, 1.0] };
-        let ([sin_x, cos_x], [sin_y, cos_y]) = (self.circle(0, node.u), self.circle(1, node.v));
+        let [east, north, up] = if normal == [0.0; 3] { [0.0, 0.0, 1.0] } else { normal.map(f64::from) };
+        let [[sin_x, cos_x], [sin_y, cos_y]] = self.circles(node);
         let outwards = up * cos_y - north * sin_y;
-        let normal = [outwards * cos_x - east * sin_x, outwards * sin_x + east * cos_x, north * cos_y + up * sin_y];
-        let length = length(normal);
-        normal.map(|along| along / length)
+        [outwards * cos_x - east * sin_x, outwards * sin_x + east * cos_x, north * cos_y + up * sin_y]
     }
 }
 
 /// Returns a direction on an unfolded octahedron, in two bytes (Meyer et al. 2010; Cigolle et al. 2014, "A survey of efficient representations for
 /// independent unit vectors").
 fn octahedral([x, y, z]: [f64; 3]) -> [u8; 2] {
-    let sum = x.abs() + y.abs() + z.abs();
-    let [x, y] = [x / sum, y / sum];
-    let sign = |along: f64| if along < 0.0 { -1.0 } else { 1.0 };
-    let folded = if z < 0.0 { [(1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y)] } else { [x, y] };
-    folded.map(|along| ((along.clamp(-1.0, 1.0) * 0.5 + 0.5) * 255.0 + 0.5).floor() as u8)
+    let scale = 1.0 / (x.abs() + y.abs() + z.abs());
+    let [x, y] = [x * scale, y * scale];
+    let folded = if z < 0.0 { [(1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)] } else { [x, y] };
+    // From 0 on, so that the fraction is cut off.
+    folded.map(|along| ((along * 0.5 + 0.5) * 255.0 + 0.5) as u8)
 }

@@ -21,7 +21,9 @@ mod header;
 mod layer;
 mod mesh;
 mod normals;
+mod number_hash;
 mod place;
+mod refine;
 mod rough;
 mod side;
 #[cfg(test)]

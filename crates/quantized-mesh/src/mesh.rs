@@ -43,8 +43,13 @@ impl Node {
 
     /// Returns its place on the Z-order curve.
     pub(crate) fn order(self) -> u32 {
-        spread(self.u) | spread(self.v) << 1
+        order([self.u, self.v])
     }
+}
+
+/// Returns the place of a column and a row on the Z-order curve.
+pub(crate) fn order([column, row]: [u16; 2]) -> u32 {
+    spread(column) | spread(row) << 1
 }
 
 /// Returns the bits of a number, with a zero bit after each.

@@ -1,10 +1,10 @@
 //! Normals of the terrain at vertices, the same in all tiles that share one.
 
 use crate::mesh::{LAST, OUTSIDE, TileMesh};
+use crate::number_hash::NumberMap;
 use crate::place::{HEIGHT_STEPS, SPAN};
 use crate::tile::Tile;
 use bytemuck::{Pod, Zeroable};
-use std::collections::HashMap;
 
 /// The mean radius of the earth in metres. The scale of a tile needs no more.
 const RADIUS: f64 = 6_371_000.0;
@@ -21,43 +21,44 @@ pub struct BorderNormal {
 
 /// Returns for each vertex the sum of the normals of its triangles, east, north and up, each as long as twice the area of its triangle. Triangles
 /// beside the terrain add nothing.
-pub(crate) fn sums(mesh: &TileMesh, tile: Tile) -> Vec<[f32; 3]> {
+fn sums(mesh: &TileMesh, tile: Tile, triangles: impl Iterator<Item = [u32; 3]>) -> Vec<[f32; 3]> {
     let step = tile.side() * RADIUS / SPAN as f64;
-    let scale = [step * libm::cos(tile.middle_latitude()), step, 1.0 / HEIGHT_STEPS];
+    let [x, y, z] = [step * libm::cos(tile.middle_latitude()), step, 1.0 / HEIGHT_STEPS];
+    // In steps first, then in square metres.
+    let scale = [y * z, z * x, x * y];
     let mut sums = vec![[0.0f64; 3]; mesh.nodes.len()];
-    for triangle in &mesh.triangles {
+    for triangle in triangles {
         let [a, b, c] = triangle.map(|v| mesh.nodes[v as usize]);
         if [a, b, c].iter().any(|node| node.h == OUTSIDE) {
             continue;
         }
         let from_a = |node: crate::Node| {
             let along = |to: u16, from: u16| f64::from(i32::from(to) - i32::from(from));
-            [
-                along(node.u, a.u) * scale[0],
-                along(node.v, a.v) * scale[1],
-                (f64::from(node.h) - f64::from(a.h)) * scale[2],
-            ]
+            [along(node.u, a.u), along(node.v, a.v), f64::from(node.h) - f64::from(a.h)]
         };
         let (p, q) = (from_a(b), from_a(c));
         let normal = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
-        for &v in triangle {
+        for v in triangle {
             let sum = &mut sums[v as usize];
             (0..3).for_each(|k| sum[k] += normal[k]);
         }
     }
-    sums.into_iter().map(|sum| sum.map(|along| along as f32)).collect()
+    sums.into_iter().map(|sum| [0, 1, 2].map(|k| (sum[k] * scale[k]) as f32)).collect()
 }
 
 /// Returns what a tile adds to the normals on its border.
 pub fn border_normals(mesh: &TileMesh, tile: Tile) -> Vec<BorderNormal> {
-    let on_border = mesh.nodes.iter().zip(sums(mesh, tile)).filter(|(node, _)| node.is_on_border());
+    let is_on_border: Vec<bool> = mesh.nodes.iter().map(|node| node.is_on_border()).collect();
+    let is_at_border = |triangle: &[u32; 3]| triangle.iter().any(|&v| is_on_border[v as usize]);
+    let at_border = mesh.triangles.iter().copied().filter(is_at_border);
+    let on_border = mesh.nodes.iter().zip(sums(mesh, tile, at_border)).filter(|(node, _)| node.is_on_border());
     on_border.map(|(node, sum)| BorderNormal { place: [node.u, node.v], sum }).collect()
 }
 
 /// Returns the normals of a tile, of any length. `around` are the borders of the tiles around it, by the columns east and the rows north that they
 /// lie, from south to north and from west to east.
 pub(crate) fn normals(mesh: &TileMesh, tile: Tile, around: &[([i32; 2], Vec<BorderNormal>)]) -> Vec<[f32; 3]> {
-    let mut normals = sums(mesh, tile);
+    let mut normals = sums(mesh, tile, mesh.triangles.iter().copied());
     let own: Vec<BorderNormal> = (mesh.nodes.iter().zip(&normals))
         .filter(|(node, _)| node.is_on_border())
         .map(|(node, sum)| BorderNormal { place: [node.u, node.v], sum: *sum })
@@ -67,7 +68,7 @@ pub(crate) fn normals(mesh: &TileMesh, tile: Tile, around: &[([i32; 2], Vec<Bord
     tiles.push(([0, 0], &own));
     // All tiles around a vertex add in the same order, so that they get the same bits.
     tiles.sort_by_key(|([east, north], _)| [*north, *east]);
-    let mut shared: HashMap<[u16; 2], [f32; 3]> = HashMap::new();
+    let mut shared: NumberMap<[u16; 2], [f32; 3]> = NumberMap::default();
     for (offset, border) in tiles {
         for normal in border {
             let moved = |axis: usize| {
@@ -80,7 +81,7 @@ pub(crate) fn normals(mesh: &TileMesh, tile: Tile, around: &[([i32; 2], Vec<Bord
             }
         }
     }
-    for (node, normal) in mesh.nodes.iter().zip(&mut normals) {
+    for (node, normal) in mesh.nodes.iter().zip(&mut normals).filter(|(node, _)| node.is_on_border()) {
         if let Some(sum) = shared.get(&[node.u, node.v]) {
             *normal = *sum;
         }

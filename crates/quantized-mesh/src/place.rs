@@ -25,7 +25,7 @@ impl GridPoint {
     /// may be beyond half a turn. `None` if the height is more than half a million metres.
     pub fn nearest(zoom: u8, [longitude, latitude]: [f64; 2], height: f64) -> Option<GridPoint> {
         let per_radian = (SPAN << zoom) as f64 / std::f64::consts::PI;
-        let step = |radians: f64, zero: f64| ((radians + zero) * per_radian + 0.5).floor() as i64;
+        let step = |radians: f64, zero: f64| floor((radians + zero) * per_radian + 0.5);
         let (half, quarter) = (std::f64::consts::PI, std::f64::consts::FRAC_PI_2);
         Some(GridPoint { x: step(longitude, half), y: step(latitude, quarter), z: height_steps(height)? })
     }
@@ -37,6 +37,28 @@ impl GridPoint {
 
 /// Returns a height in metres in steps; `None` if it is more than half a million metres.
 pub fn height_steps(metres: f64) -> Option<i32> {
-    let steps = (metres * HEIGHT_STEPS + 0.5).floor();
-    (steps.abs() < f64::from(i32::MAX)).then_some(steps as i32)
+    let steps = metres * HEIGHT_STEPS + 0.5;
+    (steps.abs() < f64::from(i32::MAX)).then(|| floor(steps) as i32)
+}
+
+/// Returns the greatest whole number that is not above a number of usual size. Without a vector extension, `f64::floor` is a call.
+fn floor(number: f64) -> i64 {
+    let towards_zero = number as i64;
+    towards_zero - i64::from(towards_zero as f64 > number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floors_are_those_of_the_standard_library() {
+        for number in [0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 1e15 + 0.5, -1e15 - 0.5, 2.9999, -2.0001] {
+            assert_eq!(floor(number), number.floor() as i64, "{number}");
+        }
+        assert_eq!(
+            [524_287.0, 524_288.0, -524_288.0, f64::MAX].map(height_steps),
+            [Some(2_147_479_552), None, None, None]
+        );
+    }
 }

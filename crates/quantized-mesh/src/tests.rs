@@ -210,6 +210,29 @@ proptest! {
         }
     }
 
+    /// Vertices that are a few steps from a corner of four tiles, and from their sides.
+    #[test]
+    fn coarser_tiles_meet_where_vertices_are_dense(
+        seed in 0u64..1 << 40,
+        count in 1usize..300,
+        reach in prop::sample::select(vec![3i64, 20, 2_000, 40_000]),
+    ) {
+        let mut finer = tiles(&terrain_with_pairs(seed, count, reach, 1, 4), 1);
+        for zoom in (ZOOM - 3..ZOOM).rev() {
+            let mut children: BTreeMap<[i32; 2], Vec<Child>> = BTreeMap::new();
+            for ([x, y], mesh) in finer {
+                let child = Child { quadrant: [(x & 1) as u8, (y & 1) as u8], nodes: mesh.nodes };
+                children.entry([x >> 1, y >> 1]).or_default().push(child);
+            }
+            let make = |([x, y], children): ([i32; 2], Vec<Child>)| {
+                ([x, y], coarser(Tile { zoom, x, y }, &children, 0).unwrap().0)
+            };
+            finer = children.into_iter().map(make).collect();
+            finer.values().for_each(check_whole);
+            check_meeting(&finer);
+        }
+    }
+
     #[test]
     fn tiles_come_back_from_their_bytes(seed in 0u64..1 << 40, count in 1usize..300, range in 1i64..1 << 20) {
         let mut terrain = terrain(seed, count, 50_000, 1);
@@ -221,6 +244,7 @@ proptest! {
             let tile = decode(&bytes).unwrap();
             prop_assert_eq!(tile.vertices.len(), mesh.nodes.len());
             prop_assert_eq!(tile.normals.len(), mesh.nodes.len());
+            prop_assert_eq!(tile.fault(), None);
             let heights: BTreeMap<[u16; 2], i32> = mesh.nodes.iter().map(|node| ([node.u, node.v], node.height(3))).collect();
             for (i, [u, v, _]) in tile.vertices.iter().enumerate() {
                 let off = tile.height(i) - f64::from(heights[&[*u, *v]]) / HEIGHT_STEPS;
@@ -264,6 +288,26 @@ proptest! {
             let count = tile.vertices.len() as u32;
             prop_assert!(tile.triangles.iter().flatten().chain(tile.sides.iter().flatten()).all(|v| *v < count));
         }
+    }
+}
+
+#[test]
+fn faults_of_a_mesh_are_found() {
+    let (place, mesh) = tiles(&terrain(8, 60, 50_000, 1), 1).pop_first().unwrap();
+    let surface = Surface { tile: Tile { zoom: ZOOM, x: place[0], y: place[1] }, mesh: &mesh, outside: 0, around: &[] };
+    let tile = decode(&encode(&surface, HeightSteps::over(300_000))).unwrap();
+    let faults = [
+        |tile: &mut DecodedTile| tile.triangles[0].swap(0, 1),
+        |tile: &mut DecodedTile| tile.triangles.truncate(tile.triangles.len() - 1),
+        |tile: &mut DecodedTile| tile.sides[1].truncate(1),
+        |tile: &mut DecodedTile| tile.sides[2].reverse(),
+        |tile: &mut DecodedTile| tile.sides.swap(0, 2),
+    ];
+    assert_eq!(tile.fault(), None);
+    for (number, make) in faults.iter().enumerate() {
+        let mut broken = tile.clone();
+        make(&mut broken);
+        assert!(broken.fault().is_some(), "{number}");
     }
 }
 

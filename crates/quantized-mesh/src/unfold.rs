@@ -1,7 +1,7 @@
 //! Triangles that rounding has turned over or flattened become others by flips of edges.
 
 use crate::mesh::{Node, double_area, in_order, least_first};
-use std::collections::{HashMap, HashSet};
+use crate::number_hash::{NumberMap, NumberSet};
 
 /// No tile needs as many rounds of flips.
 const MOST_ROUNDS: usize = 16;
@@ -24,15 +24,15 @@ pub(crate) fn unfolded(nodes: &[Node], triangles: Vec<[u32; 3]>) -> (Vec<[u32; 3
 
 /// Leaves out triangles that lie on one another, back to back.
 fn without_pairs(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    let all: HashSet<[u32; 3]> = triangles.iter().map(|&triangle| least_first(triangle)).collect();
+    let all: NumberSet<[u32; 3]> = triangles.iter().map(|&triangle| least_first(triangle)).collect();
     let has_back = |[a, b, c]: [u32; 3]| all.contains(&least_first([a, c, b]));
     triangles.iter().copied().filter(|&triangle| !has_back(triangle)).collect()
 }
 
 /// Flips edges of triangles without area where both triangles that this makes have some.
 fn flip_all(triangles: &mut [[u32; 3]], area: &dyn Fn(&[u32; 3]) -> i64) {
-    let mut owners: HashMap<[u32; 2], usize> = HashMap::new();
-    let mut crowded: HashSet<[u32; 2]> = HashSet::new();
+    let mut owners: NumberMap<[u32; 2], usize> = NumberMap::default();
+    let mut crowded: NumberSet<[u32; 2]> = NumberSet::default();
     for (t, &[a, b, c]) in triangles.iter().enumerate() {
         for edge in [[a, b], [b, c], [c, a]] {
             if owners.insert(edge, t).is_some() {

@@ -341,11 +341,6 @@ impl Block {
         self.complete(selected, concerns_border);
     }
 
-    /// Looks at all triangles again in the next round, because that has another bound.
-    pub(crate) fn forget_bound(&mut self) {
-        self.mesh.changed = (0..self.mesh.held.len() as u32).collect();
-    }
-
     /// Proposes points to select.
     pub(crate) fn propose(&mut self, bound: ErrorBound) -> Proposal {
         let far = far_above(bound);

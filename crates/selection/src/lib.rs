@@ -24,6 +24,6 @@ mod tests;
 
 pub use error_bound::{ErrorBound, VerticalError};
 pub use rounds::{Figures, Selection};
-pub use select::{select, select_down};
+pub use select::select;
 pub use selected_sites::SelectedSites;
 pub use source::{BYTES_PER_LISTED, BYTES_PER_POINT, BYTES_PER_SELECTED, BlockPoints, PointSource};

@@ -70,8 +70,6 @@ pub(crate) struct Rounds<'a, E> {
     /// What the last round selected, by the cells of `selected`.
     newly_selected: Vec<[i32; 3]>,
     figures: Figures,
-    /// The most points that are to be selected.
-    most: u64,
 }
 
 impl<'a, E: Send> Rounds<'a, E> {
@@ -84,14 +82,7 @@ impl<'a, E: Send> Rounds<'a, E> {
             selected: SelectedSites::none(bounds, points),
             newly_selected: Vec::new(),
             figures: Figures::default(),
-            most: u64::MAX,
         }
-    }
-
-    /// Selects no more than so many points, besides those that are selected first.
-    pub(crate) fn limited_to(mut self, most: u64) -> Rounds<'a, E> {
-        self.most = most;
-        self
     }
 
     /// Tells what is known of all blocks, the corners of the hull of the cloud, what is selected first, and the rounds that this took.
@@ -115,22 +106,6 @@ impl<'a, E: Send> Rounds<'a, E> {
         self.finish()
     }
 
-    /// Does rounds for one bound after the other, as long as there is room for their points. Returns the selected points and the last bound
-    /// that is kept; `None` if that is none of them.
-    ///
-    /// # Errors
-    /// Those of the source.
-    pub(crate) fn run_down(mut self, bounds: &[ErrorBound]) -> Result<(SelectedSites, Option<ErrorBound>), E> {
-        let mut kept = None;
-        for &bound in bounds {
-            if !self.down_to(bound)? {
-                break;
-            }
-            kept = Some(bound);
-        }
-        Ok((self.selected, kept))
-    }
-
     fn add(&mut self, mut points: Vec<[i32; 3]>) {
         // Neighbours in the plane one after the other: what a block looks at for one is still in the cache for the next.
         points.par_sort_unstable_by_key(|&point| (self.selected.cell_of(point), point));
@@ -147,23 +122,15 @@ impl<'a, E: Send> Rounds<'a, E> {
         rows.flat_map(move |row| &self.newly_selected[from(row, columns.start)..from(row, columns.end)])
     }
 
-    /// Does rounds until no point exceeds `bound`. Returns whether there was room for the points that this takes.
-    fn down_to(&mut self, bound: ErrorBound) -> Result<bool, E> {
-        for state in &mut self.blocks {
-            let state = state.get_mut().unwrap_or_else(PoisonError::into_inner);
-            state.settled = None;
-            state.block.iter_mut().for_each(Block::forget_bound);
-        }
+    /// Does rounds until no point exceeds `bound`.
+    fn down_to(&mut self, bound: ErrorBound) -> Result<(), E> {
         loop {
             let proposals =
                 (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|block| self.proposal_of(block, bound));
             let accepted = accept(proposals.collect::<Result<_, E>>()?, far_above(bound));
             self.newly_selected.clear();
             if accepted.is_empty() {
-                return Ok(true);
-            }
-            if self.selected.count() + accepted.len() as u64 > self.most {
-                return Ok(false);
+                return Ok(());
             }
             self.add(accepted);
             self.figures.rounds += 1;

@@ -5,7 +5,6 @@ use crate::hull::hull_corners;
 use crate::regions::{Division, RegionSizes, divide};
 use crate::rounds::{BlockState, Rounds, Selection};
 use crate::seeds::Seeds;
-use crate::selected_sites::SelectedSites;
 use crate::source::{BlockPoints, PointSource};
 use delaunay::geometry::Bounds;
 use rayon::prelude::*;
@@ -25,32 +24,6 @@ pub fn select<S: PointSource>(source: &S, bound: ErrorBound) -> Result<Selection
     let points = found.iter().map(|state| state.points).sum();
     let bounds = bounds.unwrap_or(Bounds::of_point([0, 0]));
     select_by_regions(source, bounds, points, bound, RegionSizes::USUAL)
-}
-
-/// Selects points for one of the descending `bounds` after the other, as long as all selected points are no more than `most`, besides those that are
-/// selected in any case. Returns them and the last bound that is kept, `None` if that is none. The cloud must not have so many points that it is
-/// divided into regions.
-///
-/// # Errors
-/// Those of `source`.
-pub fn select_down<S: PointSource>(
-    source: &S,
-    bounds: &[ErrorBound],
-    most: u64,
-) -> Result<(SelectedSites, Option<ErrorBound>), S::Error> {
-    let mut points = Vec::new();
-    for block in 0..source.blocks() {
-        points.push(source.load(block)?);
-    }
-    let all = points.iter().flat_map(|block| block.points.iter().map(|p| [p[0], p[1]]));
-    let area = Bounds::of_points(all).unwrap_or(Bounds::of_point([0, 0]));
-    let count = points.iter().map(|block| block.points.len() as u64).sum();
-    let mut rounds = Rounds::new(source, area, count).limited_to(most);
-    let mut seeds = Seeds::none(area, count);
-    points.iter().for_each(|block| seeds.add(&block.points, &block.fixed));
-    let outline = seeds.hull().to_vec();
-    rounds.begin(points.iter().map(|block| BlockState::of(&block.points)).collect(), outline, seeds.into_points(), 0);
-    rounds.run_down(bounds)
 }
 
 /// As [`select`], of `points` points in `bounds`. A cloud of many points is divided into regions by the lattice, and points are selected from

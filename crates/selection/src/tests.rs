@@ -178,43 +178,6 @@ proptest! {
         seeds.add(&points, &[]);
         prop_assert_eq!(found, plain_rounds(&points, seeds.into_points(), bound));
     }
-
-    /// One bound after the other is rounds for each, from what the one before has selected on.
-    #[test]
-    fn a_ladder_is_rounds_for_each_bound(
-        reach in prop::sample::select(vec![13, 40, 5000]),
-        places in prop::collection::vec((0..5000i32, 0..5000i32), 1..150),
-        seed in 0..40i32,
-        side in prop::sample::select(vec![7, 701, 100_000]),
-        most in prop::sample::select(vec![5u64, 30, 1000]),
-    ) {
-        let points = cloud(reach, places, |x, y| (x * 31 + y * seed) % 97);
-        let bounds = [60, 20, 5].map(|steps| ErrorBound::new(steps, 1));
-        let source = Cloud::new(&points, &[], side.max(reach / 12), true);
-        let (found, kept) = select_down(&source, &bounds, most).unwrap();
-        let mut found: Vec<[i32; 3]> = found.within(bounds_of(&points)).collect();
-        found.sort_unstable();
-        let mut seeds = crate::seeds::Seeds::none(bounds_of(&points), points.len() as u64);
-        seeds.add(&points, &[]);
-        let mut expected = seeds.into_points();
-        let first = expected.len();
-        let mut last = None;
-        for bound in bounds {
-            let next = plain_rounds(&points, expected.clone(), bound);
-            if next.len() as u64 > most && next.len() > expected.len() {
-                break;
-            }
-            (expected, last) = (next, Some(bound));
-        }
-        prop_assert_eq!(kept, last);
-        prop_assert!(found.len() as u64 <= most.max(first as u64));
-        // What is selected beyond the last bound that is kept comes from rounds for the next.
-        let chosen: BTreeSet<_> = found.iter().copied().collect();
-        prop_assert!(expected.iter().all(|point| chosen.contains(point)));
-        if last == bounds.last().copied() {
-            prop_assert_eq!(found, expected);
-        }
-    }
 }
 
 #[test]

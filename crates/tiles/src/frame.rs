@@ -279,9 +279,11 @@ impl Frame {
         (is_there && self.world(point) == world).then_some(point)
     }
 
-    /// Returns the lattice points at `positions` of a mesh that its node moves by `translation` and stretches by `scale`, or the first place
-    /// in metres where the lattice has no point.
-    pub(crate) fn points(
+    /// Returns the lattice points at `positions` of a mesh that its node moves by `translation` and stretches by `scale`.
+    ///
+    /// # Errors
+    /// The first place in metres where the lattice has no point.
+    pub fn points(
         &self,
         positions: &[[f32; 3]],
         translation: [f64; 3],

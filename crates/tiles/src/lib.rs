@@ -17,6 +17,7 @@ pub mod frame;
 pub mod geopackage;
 pub mod gltf;
 pub mod gzip;
+mod huffman;
 pub mod lod;
 pub mod map_tiles;
 pub mod normals;

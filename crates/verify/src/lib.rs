@@ -61,6 +61,11 @@
 //! With `[output] max_error` not all points are vertices. [`verify_against`] proves that each of the others is within the bound of the triangle
 //! below or above it (`surface.rs`).
 //!
+//! # Terrain tiles for globes
+//!
+//! If there is a `terrain/layer.json`, all tiles that it lists must be there and no others, each must cover its place once, and neighbours must have the
+//! same vertices between them, at the same heights to the last bit (`terrain_tiles.rs`). How close they are to the mesh is not proved.
+//!
 //! # What the job wrote
 //!
 //! All of this also holds for a terrain that was changed consistently: one vertex raised, say, or all tiles moved. So every file is
@@ -86,6 +91,7 @@ mod keyed_records;
 mod mesh_check;
 mod report;
 mod surface;
+mod terrain_tiles;
 mod tile_files;
 mod verdict;
 mod watcher;
@@ -110,6 +116,7 @@ use crate::inputs::{Inputs, Places, lattice_of};
 use crate::mesh_check::check_mesh;
 use crate::report::ReadReport;
 use crate::surface::Surface;
+use crate::terrain_tiles::TerrainTiles;
 use crate::tile_files::TileFiles;
 use crate::verdict::CheckedMesh;
 use crate::watcher::Unwatched;
@@ -189,7 +196,9 @@ pub fn verify_watched(directory: &Path, memory: u64, inputs: &[PathBuf], watcher
     let proof =
         inputs.zip(run.places).map(|(inputs, places)| inputs.compare(places, run.surface, lines.as_ref(), &grid));
     let proof = proof.transpose()?;
-    Ok(Verdict::new(CheckedMesh { files: &files, findings, matches, lines: checked_lines }, &report, &written, proof))
+    let terrain = TerrainTiles::check(directory, memory)?;
+    let mesh = CheckedMesh { files: &files, findings, matches, lines: checked_lines, terrain };
+    Ok(Verdict::new(mesh, &report, &written, proof))
 }
 
 /// What the threads share that check files.

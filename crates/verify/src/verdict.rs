@@ -11,6 +11,7 @@ use crate::findings::Findings;
 use crate::hull::check_boundary;
 use crate::inputs::InputProof;
 use crate::report::{ReadReport, ReportedFacts};
+use crate::terrain_tiles::TerrainTiles;
 use crate::tile_files::TileFiles;
 use crate::written_files::WrittenFiles;
 use delaunay::geometry::Site;
@@ -35,6 +36,8 @@ pub struct Verdict {
     pub ties: u64,
     /// Edges along breaklines, if the job had any.
     pub breaklines: Option<u64>,
+    /// Terrain tiles for globes, if the job wrote some.
+    pub terrain_tiles: Option<u64>,
     /// 32 hexadecimal digits that depend on the triangles of the mesh, not on the tiles: see [`Digest`](crate::Digest).
     pub digest: String,
     /// The digest of the vertices, heights included: see [`VertexDigest`].
@@ -76,6 +79,8 @@ pub(super) struct CheckedMesh<'a> {
     pub(super) matches: BorderMatches,
     /// `None` if there is no list of edges along breaklines.
     pub(super) lines: Option<CheckedBreaklines>,
+    /// `None` if there are no terrain tiles.
+    pub(super) terrain: Option<TerrainTiles>,
 }
 
 impl Verdict {
@@ -86,7 +91,7 @@ impl Verdict {
         written: &WrittenFiles,
         inputs: Option<InputProof>,
     ) -> Verdict {
-        let CheckedMesh { files, mut findings, matches, lines } = mesh;
+        let CheckedMesh { files, mut findings, matches, lines, terrain } = mesh;
         let facts = &report.facts;
         let vertices = findings.vertices.join(matches.vertices);
         let mut verdict = Verdict {
@@ -122,6 +127,10 @@ impl Verdict {
         // Without cut/ its sites are missing too, which says nothing about the inputs.
         verdict.add_inputs(inputs, gone.is_some());
         verdict.is_mesh_sound = verdict.failures.is_empty();
+        if let Some(TerrainTiles { tiles, failures, .. }) = terrain {
+            verdict.terrain_tiles = Some(tiles);
+            verdict.failures.extend(failures);
+        }
         verdict.conclude(report, written)
     }
 
@@ -268,6 +277,9 @@ impl fmt::Display for Verdict {
         }
         if let Some(edges) = self.breaklines {
             writeln!(f, "{:<20}{:>34}", "along breaklines", edges)?;
+        }
+        if let Some(tiles) = self.terrain_tiles {
+            writeln!(f, "{:<20}{:>34}", "terrain tiles", tiles)?;
         }
         writeln!(f, "{:<20}{:>34}", "digest", self.digest)?;
         writeln!(f, "{:<20}{:>34}", "digest of vertices", self.vertex_digest)?;

@@ -68,6 +68,9 @@ pub struct Preflight {
     /// About how large the contour lines are, if there are to be some.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contours: Option<ContourEstimate>,
+    /// About how many bytes the terrain tiles for globes take, if there are to be some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub terrain: Option<u64>,
     /// Edges along breaklines; `None` without any.
     pub breaklines: Option<u64>,
     /// Steps of the lattice in x and y, and in z.
@@ -164,6 +167,7 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
         preflight.warnings.extend(vertices.and_then(|vertices| too_many_vertices(options, vertices)));
         preflight.tiles = vertices.map_or(preflight.tiles, |vertices| estimate::tiles(&plan, KeptPoints(vertices)));
         preflight.exports = exports(options, vertices.unwrap_or(preflight.kept));
+        preflight.terrain = estimate::terrain(vertices.unwrap_or(preflight.kept), &options.output);
     }
     Ok((preflight, plan))
 }
@@ -227,6 +231,7 @@ impl Preflight {
             raster: planned_raster(plan).map(|grid| grid.size()),
             exports: exports(options, kept.0),
             contours,
+            terrain: estimate::terrain(kept.0, &options.output),
             breaklines: plan.breaklines.as_ref().map(|lines| lines.findings.subsegments),
             resolution: [plan.lattice.resolution.to_string(), plan.lattice.resolution_z.to_string()],
             size: [0, 1].map(|axis| plan.extent.extent(axis) as f64 * resolution),
@@ -345,6 +350,9 @@ impl fmt::Display for Preflight {
         }
         if let Some(ContourEstimate { points, bytes, .. }) = &self.contours {
             row("contours", format!("about {} points of lines, {}", grouped(rough(*points)), mebibytes(*bytes)))?;
+        }
+        if let Some(bytes) = self.terrain {
+            row("terrain tiles", format!("about {}", mebibytes(bytes)))?;
         }
         row("area", format!("{:.1} x {:.1} {}", self.size[0], self.size[1], self.unit))?;
         let coarser = self.longest_triangle.map_or(String::new(), |longest| {

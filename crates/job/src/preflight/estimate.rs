@@ -94,9 +94,16 @@ impl DiskEstimate {
         let page = if options.output.page { PAGE } else { 0 };
         let (exports, mesh) = export_bytes(points, &options.output);
         let in_contours = contours.map_or(0, ContourEstimate::disk);
-        let (terrain, terrain_temporary) = terrain_bytes(points, &options.output);
-        let results =
-            in_tiles + pixels * PREVIEW_PER_PIXEL + page + raster + map_tiles + exports + in_contours + terrain;
+        let terrain = terrain(points, &options.output);
+        let terrain_temporary = terrain.map_or(0, |_| points * WAITING_PER_POINT);
+        let results = in_tiles
+            + pixels * PREVIEW_PER_PIXEL
+            + page
+            + raster
+            + map_tiles
+            + exports
+            + in_contours
+            + terrain.unwrap_or(0);
         // The raster goes together before the map tiles, these before the mesh is numbered, that is done before contour lines are traced, and terrain tiles
         // come last.
         let beside =
@@ -111,12 +118,14 @@ impl DiskEstimate {
     }
 }
 
-/// Returns the bytes of terrain tiles for globes, and those of the files in which they wait.
-fn terrain_bytes(points: u64, output: &OutputOptions) -> (u64, u64) {
-    // Measured on autzen.laz: 19 bytes a point for all zooms. Pieces and tiles wait with 8 bytes a vertex, 12 a triangle, and more along borders.
+/// Bytes of the files in which terrain tiles wait, for a point: 8 a vertex of a piece and of a tile, 6 a triangle, and more along borders.
+const WAITING_PER_POINT: u64 = 56;
+
+/// Returns about how many bytes the terrain tiles of a mesh of so many points take; `None` if there are to be none.
+pub(crate) fn terrain(points: u64, output: &OutputOptions) -> Option<u64> {
+    // Measured on autzen.laz: 18 bytes a point for all zooms.
     const PER_POINT: u64 = 24;
-    const WAITING: u64 = 80;
-    if output.terrain.is_some() { (points * PER_POINT, points * WAITING) } else { (0, 0) }
+    output.terrain.map(|_| points * PER_POINT)
 }
 
 /// Returns the bytes of leaves whose tiles are not written yet, at most at one time. Tiles along the borders of large parts of the

@@ -63,11 +63,9 @@ fn mesh_of(TileFile { parts, .. }: &TileFile, path: &Path, frame: &Frame) -> Res
     let mut mesh = LatticeMesh::default();
     for part in parts {
         let first = mesh.positions.len() as u32;
-        for v in 0..part.positions.len() {
-            let world = part.world(v);
-            let off_lattice = || Error::input(path, format!("the vertex at {world:?} is not on the job's lattice"));
-            mesh.positions.push(frame.integers(world).ok_or_else(off_lattice)?);
-        }
+        let points = frame.points(&part.positions, part.translation, part.scale);
+        let off_lattice = |world| Error::input(path, format!("the vertex at {world:?} is not on the job's lattice"));
+        mesh.positions.extend(points.map_err(off_lattice)?);
         mesh.triangles.extend(part.triangles.iter().map(|triangle| triangle.map(|v| first + v)));
     }
     Ok(mesh)

@@ -19,6 +19,13 @@ struct Counts {
     corners: [i32; 4],
 }
 
+impl Counts {
+    /// Tells whether numbers of vertices take two bytes.
+    fn is_short(&self) -> bool {
+        self.nodes <= 1 << 16
+    }
+}
+
 impl WaitingRecords {
     /// Makes the file at `path`.
     ///
@@ -49,8 +56,19 @@ impl WaitingRecords {
         let [of_border, of_nodes, of_triangles] =
             [border.len(), nodes.len(), triangles.len()].map(|count| count as u32);
         let counts = Counts { border: of_border, nodes: of_nodes, triangles: of_triangles, corners };
-        let record = [bytes_of(&counts), cast_slice(border), cast_slice(nodes), cast_slice(triangles)].concat();
-        self.0.add(&record)
+        let short: Vec<u16> = match counts.is_short() {
+            true => triangles.as_flattened().iter().map(|&v| v as u16).collect(),
+            false => Vec::new(),
+        };
+        let corners: &[u8] = if counts.is_short() { cast_slice(&short) } else { cast_slice(triangles) };
+        let parts = [bytes_of(&counts), cast_slice(border), cast_slice(nodes), corners];
+        let first = self.0.reserve(parts.iter().map(|part| part.len() as u64).sum());
+        let mut at = first;
+        for part in parts {
+            self.0.write(part, at)?;
+            at += part.len() as u64;
+        }
+        Ok(first)
     }
 
     /// Reads a piece.
@@ -61,7 +79,7 @@ impl WaitingRecords {
         let (counts, mut at) = self.counts(at)?;
         at += u64::from(counts.border) * size_of::<BorderNormal>() as u64;
         let nodes = self.list(&mut at, counts.nodes)?;
-        let triangles = self.list(&mut at, counts.triangles)?;
+        let triangles = self.triangles(&mut at, counts)?;
         Ok(Piece { nodes, triangles, corners: counts.corners.map(|corner| (corner != OUTSIDE).then_some(corner)) })
     }
 
@@ -97,6 +115,14 @@ impl WaitingRecords {
         let mut counts = Counts::zeroed();
         self.0.read(bytes_of_mut(&mut counts), at)?;
         Ok((counts, at + size_of::<Counts>() as u64))
+    }
+
+    fn triangles(&self, at: &mut u64, counts: Counts) -> Result<Vec<[u32; 3]>> {
+        if !counts.is_short() {
+            return self.list(at, counts.triangles);
+        }
+        let short: Vec<[u16; 3]> = self.list(at, counts.triangles)?;
+        Ok(short.into_iter().map(|corners| corners.map(u32::from)).collect())
     }
 
     /// Reads so many things, and goes on behind them.

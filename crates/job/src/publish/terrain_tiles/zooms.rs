@@ -8,10 +8,7 @@ use quantized_mesh::{
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use sys::{Error, Result, interrupt};
-use tiles::gzip::gzipped;
-
-/// Tiles are packed fast: more effort makes them a tenth smaller, and takes twice as long as all else.
-const GZIP_LEVEL: u8 = 1;
+use tiles::gzip::gzipped_mesh;
 
 /// A tile whose mesh waits.
 #[derive(Clone, Copy, Debug)]
@@ -169,7 +166,7 @@ impl Zoom {
             interrupt::check()?;
             let (mesh, around) = (self.file.mesh(waiting.at)?, self.around(waiting.tile, &places)?);
             let surface = Surface { tile: waiting.tile, mesh: &mesh, outside, around: &around };
-            write(waiting.tile, gzipped(&encode(&surface, steps), GZIP_LEVEL))
+            write(waiting.tile, gzipped_mesh(&encode(&surface, steps)))
         });
         encoded.collect()
     }
