@@ -47,8 +47,12 @@ impl Survey {
             .map(|_| [west + below(SIDE + 40), south + below(SIDE + 40), below(60) + (west + south) / 50])
             .collect();
         let path = clouds::write(self.folder.path(), &format!("square_{square:02}.csv"), &cloud);
-        // Files are told apart by their times in whole seconds too.
-        let time = SystemTime::UNIX_EPOCH + Duration::from_secs(1_500_000_000 + self.changes * 10);
+        self.date(&path);
+    }
+
+    /// Gives a file another time than it has had: files are told apart by their times in whole seconds too.
+    fn date(&self, path: &Path) {
+        let time = SystemTime::UNIX_EPOCH.checked_add(Duration::from_secs(1_500_000_000 + self.changes * 10)).unwrap();
         File::options().write(true).open(path).unwrap().set_modified(time).unwrap();
     }
 
@@ -82,8 +86,7 @@ impl Survey {
             .for_each(|name| fs::remove_dir_all(own.join(name)).unwrap());
         // The points are the same at another time.
         self.changes += 1;
-        let time = SystemTime::UNIX_EPOCH + Duration::from_secs(1_500_000_000 + self.changes * 10);
-        File::options().write(true).open(self.file(15)).unwrap().set_modified(time).unwrap();
+        self.date(&self.file(15));
         let said = self.update();
         assert!(said.err.contains("changed since the last run") && !said.err.contains("again"), "{said:?}");
         assert_eq!(list(&self.job.out()), before);

@@ -6,9 +6,8 @@ use crate::publish::side_files::EachTile;
 use crate::records::{StepRecord, Store, TileSummary};
 use crate::report::change_counts::ChangeCounts;
 use lattice::Lattice;
-use rust_decimal::prelude::ToPrimitive;
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::io::ErrorKind;
 use std::path::Path;
 use sys::{Error, Result, disk};
@@ -23,8 +22,8 @@ struct Changes {
     added: Vec<String>,
     /// Results that are no longer there.
     removed: Vec<String>,
-    /// The rectangles of the exact tiles among those that are changed or added: xmin, ymin, xmax, ymax in the units of the points.
-    areas: Vec<[f64; 4]>,
+    /// The rectangles of the exact tiles among those that are changed or added: the least x and y, and the greatest, in the units of the points.
+    areas: Vec<[[f64; 2]; 2]>,
 }
 
 /// Writes what has changed since the results that are in place, and returns how many have; `None` if there are none. It waits in the job
@@ -40,18 +39,14 @@ pub(crate) fn write_changes(
 ) -> Result<Option<ChangeCounts>> {
     let Some(old) = list_in(&directory.results().checksums())? else { return Ok(None) };
     let mut changes = Changes::between(&old, new);
-    let other: BTreeSet<&String> = changes.changed.iter().chain(&changes.added).collect();
+    let other: HashSet<&Path> = changes.changed.iter().chain(&changes.added).map(Path::new).collect();
     let mut areas = Vec::new();
     tiles.visit(&mut |store: &Store, tile| {
         let name = directory.name(&directory.output().tile(tile.number()));
-        if other.iter().any(|changed| Path::new(changed) == name) && store.has(StepRecord::Tile(tile)) {
-            areas.extend(TileSummary::load(store, tile)?.bounds().map(|bounds| {
-                let world = |value: i32, axis: usize| {
-                    let place = lattice.offset[axis] + lattice.resolution * rust_decimal::Decimal::from(value);
-                    place.to_f64().unwrap_or(f64::NAN)
-                };
-                [world(bounds.min[0], 0), world(bounds.min[1], 1), world(bounds.max[0], 0), world(bounds.max[1], 1)]
-            }));
+        if other.contains(name.as_path()) && store.has(StepRecord::Tile(tile)) {
+            let corners = TileSummary::load(store, tile)?.bounds().map(|bounds| [bounds.min, bounds.max]);
+            let world = |[x, y, _]: [i32; 3]| [lattice.world(0, x), lattice.world(1, y)];
+            areas.extend(corners.map(|corners| corners.map(world)));
         }
         Ok(())
     })?;
