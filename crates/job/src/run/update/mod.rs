@@ -5,5 +5,3 @@
 pub(crate) mod changes;
 pub(crate) mod first_plan_file;
 pub(crate) mod outdated;
-pub(crate) mod outdated_levels;
-pub(crate) mod outdated_tiles;
