@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn bytes_come_back_or_are_refused() {
-        let bytes: Vec<u8> = (0..5000u32).map(|i| (i * i >> 5) as u8).collect();
+        let bytes: Vec<u8> = (0..5000u32).map(|i| ((i * i) >> 5) as u8).collect();
         for packed in [gzipped(&bytes, 6), gzipped_mesh(&bytes)] {
             assert_eq!(gunzipped(&packed, bytes.len()).as_ref(), Some(&bytes));
             assert_eq!(gunzipped(&packed, bytes.len() - 1), None);
