@@ -235,7 +235,7 @@ mod tests {
 
         #[test]
         fn codes_are_no_longer_than_they_may_be(powers in prop::collection::vec(0u32..28, 1..257), longest in 9u8..15) {
-            let counts: Vec<u32> = powers.iter().map(|power| 1 << power >> 6).collect();
+            let counts: Vec<u32> = powers.iter().map(|power| (1 << power) >> 6).collect();
             let lengths = lengths(&counts, longest);
             let used = lengths.iter().filter(|length| **length > 0).count();
             prop_assert!(lengths.iter().zip(&counts).all(|(length, count)| *length <= longest && (*length > 0) == (*count > 0)));
