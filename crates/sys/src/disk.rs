@@ -102,15 +102,30 @@ pub fn rename(from: &Path, to: &Path) -> Result<()> {
 }
 
 /// Gives the file at `from` the path `to` too, in place of what is there. Where the file system has no hard links, `to` becomes a copy.
-/// `partial` is a path beside `to` that nothing else has.
+/// `partial` is a path on the same file system for the meantime, which nothing else has.
 pub fn link(from: &Path, to: &Path, partial: &Path) -> Result<()> {
     remove_file(partial)?;
     let copy = || fs::copy(from, partial).and_then(|_| File::open(partial)?.sync_all());
-    let linked = || fs::hard_link(from, partial).or_else(|_| copy());
+    let linked = || match fs::hard_link(from, partial) {
+        Err(e) if !matches!(e.kind(), ErrorKind::NotFound | ErrorKind::StorageFull) => copy(),
+        outcome => outcome,
+    };
     traced(linked, |()| (format!("link {}\t{}", from.display(), partial.display()), &[]))?;
     rename(partial, to)?;
     // Where both were links to one file already, nothing was renamed.
     remove_file(partial)
+}
+
+/// Tells whether both paths surely lead to one file.
+pub fn is_one_file(a: &Path, b: &Path) -> Result<bool> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let [a, b] = [a.metadata()?, b.metadata()?];
+        Ok((a.dev(), a.ino()) == (b.dev(), b.ino()))
+    }
+    #[cfg(not(unix))]
+    Ok(a.canonicalize()? == b.canonicalize()?)
 }
 
 /// Removes the file at `path` if it exists.

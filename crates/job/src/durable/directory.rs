@@ -98,6 +98,11 @@ impl JobDirectory {
         self.job.join("update.json")
     }
 
+    /// Returns the path of a result on its way from where it waits to its place, where it stays in both.
+    pub(crate) fn on_the_way(&self) -> PathBuf {
+        self.job.join("result")
+    }
+
     /// Returns the path of the file in which the blocks of a raster wait.
     pub fn raster_blocks(&self, product: RasterProduct) -> PathBuf {
         self.job.join(format!("{}.blocks", product.names()[1]))
@@ -257,7 +262,8 @@ impl JobDirectory {
     /// # Errors
     /// [`Error::Io`] if a file is missing, or cannot be renamed or removed.
     pub fn replace_results(&self, names: &HashSet<PathBuf>, keeps_waiting: bool) -> Result<()> {
-        let replacement = Replacement::prepare(&self.results, &self.waiting, names, keeps_waiting)?;
+        let on_the_way = keeps_waiting.then(|| self.on_the_way());
+        let replacement = Replacement::prepare(&self.results, &self.waiting, names, on_the_way)?;
         replacement.map_or(Ok(()), |replacement| replacement.carry_out())
     }
 

@@ -2,6 +2,7 @@
 //! taking their places.
 
 use crate::durable::listing::exists;
+use serde_json::{Map, Value};
 use std::collections::HashSet;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,12 @@ pub(crate) struct KnownResults {
     pub(crate) has_list: bool,
 }
 
+/// Tells whether the file at `path` is the list of what an update has changed: others may have a file of this name.
+fn is_list_of_changes(path: &Path) -> bool {
+    let object = std::fs::read(path).ok().and_then(|text| serde_json::from_slice::<Map<String, Value>>(&text).ok());
+    object.is_some_and(|object| ["added", "areas", "changed", "removed"].iter().all(|key| object.contains_key(*key)))
+}
+
 impl KnownResults {
     /// Returns what the lists in these folders name, and the lists and the reports themselves.
     ///
@@ -25,8 +32,10 @@ impl KnownResults {
     pub(crate) fn of(folders: &[&OutputFiles]) -> Result<KnownResults> {
         let mut known = KnownResults::default();
         for folder in folders {
-            let own = [folder.report(), folder.checksums(), folder.changes()];
-            let names = own.iter().filter_map(|path| path.strip_prefix(folder.directory()).ok());
+            let changes = folder.changes();
+            let changes = if is_list_of_changes(&changes) { Some(changes) } else { None };
+            let own = [Some(folder.report()), Some(folder.checksums()), changes];
+            let names = own.iter().flatten().filter_map(|path| path.strip_prefix(folder.directory()).ok());
             known.names.extend(names.map(Path::to_path_buf));
             known.add(&folder.checksums())?;
         }

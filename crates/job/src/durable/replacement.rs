@@ -4,7 +4,7 @@
 //! renames, removals and syncs are left that can fail. Between the removal of the old report and the arrival of the new one some
 //! files are old and some are new, and there is no report. If a failure ends the run there, the next run goes on with it.
 
-use crate::durable::atomic_file::{create_folder, partial_path, remove_file, sync_folder};
+use crate::durable::atomic_file::{create_folder, remove_file, sync_folder};
 use crate::durable::known_results::KnownResults;
 use crate::durable::listing::{Leftovers, check_page_is_ours, exists};
 use std::collections::{BTreeSet, HashSet};
@@ -12,6 +12,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use sys::disk::OpenFolder;
 use sys::{Error, Result, disk, fault};
+use tiles::checksums::Checksum;
 use tiles::file_names::OutputFiles;
 
 /// What is to be done to put the results of a job in place.
@@ -29,8 +30,8 @@ pub(crate) struct Replacement {
     directory: OpenFolder,
     /// The folders of numbered files, each after those in it. They can be opened, but they are too many to keep open.
     numbered_folders: Vec<PathBuf>,
-    /// Whether the results stay where they wait, too.
-    keeps_waiting: bool,
+    /// If the results stay where they wait, too, a path for what is on its way.
+    on_the_way: Option<PathBuf>,
 }
 
 impl Replacement {
@@ -44,7 +45,7 @@ impl Replacement {
         results: &OutputFiles,
         waiting: &OutputFiles,
         names: &HashSet<PathBuf>,
-        keeps_waiting: bool,
+        on_the_way: Option<PathBuf>,
     ) -> Result<Option<Replacement>> {
         let [report, new_report] = [results, waiting].map(OutputFiles::report);
         if !exists(&new_report)? && exists(&report)? {
@@ -70,6 +71,14 @@ impl Replacement {
                 return Err(Error::io("read", &waits)(gone));
             }
         }
+        if on_the_way.is_some() {
+            let others =
+                found.iter().map(|(waits, place)| Ok((!is_in_place(waits, place)?, waits.clone(), place.clone())));
+            let others = others.collect::<Result<Vec<_>>>()?;
+            found =
+                others.into_iter().filter(|(is_other, ..)| *is_other).map(|(_, waits, place)| (waits, place)).collect();
+        }
+        let has_others = !found.is_empty();
         found.retain(|(waits, _)| *waits != new_report);
         let new_list = waiting.checksums();
         let list = found.iter().position(|(waits, _)| *waits == new_list).map(|at| found.remove(at));
@@ -77,9 +86,14 @@ impl Replacement {
         for path in Leftovers::of(results)?.files {
             let name = path.strip_prefix(results.directory()).unwrap_or(&path);
             // A file that no list names is foreign.
-            if path != report && !names.contains(name) && known.contains(name) && exists(&path)? {
+            // An update replaces the list of what the one before has changed itself.
+            let stays = path == report || on_the_way.is_some() && path == results.changes();
+            if !stays && !names.contains(name) && known.contains(name) && exists(&path)? {
                 outdated.push(path);
             }
+        }
+        if on_the_way.is_some() && !has_others && outdated.is_empty() {
+            return Ok(None);
         }
         let folders: HashSet<&Path> = found.iter().filter_map(|(_, place)| place.parent()).collect();
         folders.into_iter().try_for_each(create_folder)?;
@@ -87,22 +101,13 @@ impl Replacement {
         numbered_folders.iter().try_for_each(|path| open(path).map(|_| ()))?;
         let directory = open(results.directory())?;
         let waiting = found;
-        Ok(Some(Replacement {
-            report,
-            new_report,
-            waiting,
-            list,
-            outdated,
-            directory,
-            numbered_folders,
-            keeps_waiting,
-        }))
+        Ok(Some(Replacement { report, new_report, waiting, list, outdated, directory, numbered_folders, on_the_way }))
     }
 
     fn put(&self, waits: &Path, place: &Path) -> Result<()> {
-        let put = match self.keeps_waiting {
-            true => disk::link(waits, place, &partial_path(place)),
-            false => disk::rename(waits, place),
+        let put = match &self.on_the_way {
+            Some(partial) => disk::link(waits, place, partial),
+            None => disk::rename(waits, place),
         };
         put.map_err(Error::io("rename the finished file to", place))
     }
@@ -135,6 +140,15 @@ impl Replacement {
         self.put(&self.new_report, &self.report)?;
         sync(&self.directory)
     }
+}
+
+/// Tells whether what waits is in its place already.
+fn is_in_place(waits: &Path, place: &Path) -> Result<bool> {
+    if !exists(place)? {
+        return Ok(false);
+    }
+    let content = |path: &Path| Checksum::of_file(path).map_err(Error::io("read", path));
+    Ok(disk::is_one_file(waits, place).map_err(Error::io("read", place))? || content(waits)? == content(place)?)
 }
 
 fn open(folder: &Path) -> Result<OpenFolder> {

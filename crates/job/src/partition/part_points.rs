@@ -309,7 +309,8 @@ impl<'a> PointsOfPart<'a> {
         let read_bytes: u64 = self.blocks.iter().map(|(_, block)| block.bytes()).sum();
         let mut buckets = vec![Bucket::default(); parts.grid.buckets()];
         for (index, block) in self.blocks {
-            let bucket = &mut buckets[index as usize];
+            let damaged = || Error::Broken(format!("a block of points belongs to bucket {index}, which there is not"));
+            let bucket = buckets.get_mut(index as usize).ok_or_else(damaged)?;
             bucket.points += u64::from(block.points);
             bucket.blocks.push(block);
         }

@@ -104,7 +104,7 @@ fn steps_of(option: &str) -> Option<&'static [JobStep]> {
     FROM_TILES.iter().find(|(name, _)| *name == option).map(|(_, steps)| *steps)
 }
 
-/// What a job is called that keeps what an update needs.
+/// The name of the option by which a job keeps what an update needs.
 const UPDATES: &str = "--update";
 
 /// What to do about a job that is no longer what tasks planned.
@@ -150,7 +150,7 @@ impl Fingerprint {
             mesh.extend(named_values(lines, &format!("breaklines {number}"), &["files"])?);
         }
         if options.updates {
-            // Such a job has journals of its own kind.
+            // A run without the option must not continue the journals of one with it, and the other way round.
             mesh.insert(UPDATES.into(), true.into());
         }
         // The points' own colours are read only if they are wanted.

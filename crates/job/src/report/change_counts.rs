@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// How many results have changed, as the report has it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ChangeCounts {
     /// Results that were there before and hold something else now.
     pub changed: u64,

@@ -22,6 +22,7 @@ use crate::publish::height_offset_check::check_height_offset;
 use crate::publish::map_tiles::check::check_map_tiles;
 use crate::publish::raster::check::check_raster;
 use crate::publish::terrain_tiles::check::check_terrain;
+use crate::report::change_counts::ChangeCounts;
 use crate::report::job_report::Report;
 use crate::run::damage::{damaged_by_tasks, is_damage};
 use crate::run::earlier_run::{EarlierRun, RunStart, place_results_of_finished_job, start};
@@ -30,6 +31,7 @@ use crate::run::part_entries::PartJournals;
 use crate::run::phases::do_phases;
 use crate::run::phases::plan_phase::note_skipped;
 use crate::run::phases::stage_costs::stage_costs;
+use crate::run::update::changes::place_no_changes;
 use crate::run::update::first_plan_file::has_first_plan;
 use crate::run::whole_run::WholeRun;
 use crate::tiles::vertex_colors::check_photo;
@@ -225,7 +227,8 @@ fn attempt(
     if let Some(report) = complete.flatten() {
         if options.updates {
             progress.note("nothing has changed since the last run");
-            return Ok(report);
+            place_no_changes(directory)?;
+            return Ok(Report { update: Some(ChangeCounts::default()), ..report });
         }
         progress.note("the last run had written all its results");
         on_threads(threads, || remove_job(directory))?;
@@ -246,8 +249,8 @@ fn attempt(
             begun,
             identity: job.fingerprint.identity(options, job.submission)?,
             job_id,
-            // That tasks have done phases is nothing to tell.
-            resumed: if is_by_tasks { 0 } else { resumed },
+            // That tasks or an earlier run have done phases is nothing to tell.
+            resumed: if is_by_tasks || is_update { 0 } else { resumed },
             stages: Mutex::new(vec![planned]),
         };
         // What tasks left was not compared with its hashes, and a disk may fail meanwhile.

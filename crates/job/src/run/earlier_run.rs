@@ -11,6 +11,7 @@ use crate::options::JobOptions;
 use crate::plan::fingerprint::{Fingerprint, JobChange, JobHeader, PLAN_AGAIN, first_few};
 use crate::plan::job_plan::Plan;
 use crate::plan::lattice_choice::LatticeCoarsening;
+use crate::progress::number_text::counted;
 use crate::progress::stage::{ProgressOutput, Stage};
 use crate::records::{JobStep, Journal, JournalEntry};
 use crate::report::job_report::Report;
@@ -144,7 +145,8 @@ impl EarlierRun {
     /// Returns how much coarser the lattice became, if the job with this fingerprint has the same mesh.
     pub(crate) fn coarsening(&self, fingerprint: &Fingerprint) -> Option<LatticeCoarsening> {
         let header = self.header.as_ref()?;
-        let is_same = !matches!(fingerprint.since(&header.fingerprint), JobChange::Mesh(_));
+        let is_update = fingerprint.updates() && fingerprint.may_update(&header.fingerprint);
+        let is_same = is_update || !matches!(fingerprint.since(&header.fingerprint), JobChange::Mesh(_));
         is_same.then_some(header.coarsening)
     }
 
@@ -153,6 +155,10 @@ impl EarlierRun {
     pub(crate) fn plan(&self, directory: &JobDirectory, header: &JobHeader, options: &JobOptions) -> Option<Plan> {
         let (old, entry) = (self.header.as_ref()?, self.entries.iter().find(|entry| entry.step == JobStep::Plan)?);
         let change = header.fingerprint.since(&old.fingerprint);
+        if self.is_complete && header.fingerprint.updates() && change != JobChange::Nothing {
+            // It is updated, which takes a plan of its own.
+            return None;
+        }
         let is_same =
             old.coarsening == header.coarsening && matches!(change, JobChange::Nothing | JobChange::FromTiles { .. });
         let plan = is_same && entry.files.iter().all(|file| file.is_whole(directory));
@@ -178,7 +184,7 @@ impl EarlierRun {
         Ok(serde_json::from_slice(&text).ok())
     }
 
-    /// Drops what is not in an update, the job with `header`, whatever its inputs hold. The key of each phase tells the rest.
+    /// Drops what an update to the job with `header` does again in any case. The key of each phase tells the rest.
     fn kept_for_update(mut self, header: &JobHeader, progress: ProgressOutput) -> EarlierRun {
         let old = self.header.as_ref().map(|old| &old.fingerprint);
         let inputs = old.map(|old| header.fingerprint.inputs_since(old)).unwrap_or_default();
@@ -199,6 +205,12 @@ impl EarlierRun {
         let mut kept = self;
         let old = kept.header.as_ref().filter(|old| old.coarsening == header.coarsening)?;
         let change = header.fingerprint.since(&old.fingerprint);
+        if header.fingerprint.updates() && !has_plan {
+            if let (true, JobChange::Mesh(what)) = (old.fingerprint.updates(), &change) {
+                progress.note(&format!("changed since the last run: {what}; everything is computed again"));
+            }
+            return None;
+        }
         if kept.is_complete && !matches!(change, JobChange::Style(_)) {
             // Its results have left their waiting places. Another style needs none of them.
             return None;
@@ -269,21 +281,35 @@ impl PartJournals {
 
     /// Tells whether all records and files hold what was written.
     fn are_whole(&self, stage: &Stage) -> Result<bool> {
-        let is_whole = |(directory, _, entries): &(JobDirectory, PartHeader, Vec<JournalEntry>)| {
-            let records: Vec<_> = records_of(entries).into_values().collect();
-            let store = open_store(directory, records.iter().copied())?;
-            let is_whole = |record| {
-                interrupt::check()?;
-                store.is_whole(record)
-            };
-            let records = records.par_iter().map(is_whole).try_reduce(|| true, |a, b| Ok(a && b))?;
-            let files = entries.par_iter().flat_map(|entry| &entry.files).map(|file| file.try_is_whole(directory));
-            let files = files.try_reduce(|| true, |a, b| Ok(a && b))?;
-            stage.advance(entries.len() as u64);
-            Ok(records && files)
-        };
-        self.0.iter().try_fold(true, |all, part| Ok(all && is_whole(part)?))
+        self.0.iter().try_fold(true, |all, (directory, _, entries)| Ok(all && is_whole(directory, entries, stage)?))
     }
+
+    /// Drops all phases of the parts whose records or files do not hold what was written. Returns how many parts that are.
+    fn drop_damaged(&mut self, stage: &Stage) -> Result<u64> {
+        let mut damaged = 0;
+        for (directory, _, entries) in &mut self.0 {
+            if !is_whole(directory, entries, stage)? {
+                entries.clear();
+                damaged += 1;
+            }
+        }
+        Ok(damaged)
+    }
+}
+
+/// Tells whether all records and files of the part with this `directory` hold what was written.
+fn is_whole(directory: &JobDirectory, entries: &[JournalEntry], stage: &Stage) -> Result<bool> {
+    let records: Vec<_> = records_of(entries).into_values().collect();
+    let store = open_store(directory, records.iter().copied())?;
+    let is_whole = |record| {
+        interrupt::check()?;
+        store.is_whole(record)
+    };
+    let records = records.par_iter().map(is_whole).try_reduce(|| true, |a, b| Ok(a && b))?;
+    let files = entries.par_iter().flat_map(|entry| &entry.files).map(|file| file.try_is_whole(directory));
+    let files = files.try_reduce(|| true, |a, b| Ok(a && b))?;
+    stage.advance(entries.len() as u64);
+    Ok(records && files)
 }
 
 /// Tells whether `names` are those of all results of the job, as its list has them. A journal that is damaged names fewer.
@@ -354,7 +380,18 @@ pub(crate) fn start<'a>(
         true => Some(earlier.kept_for_update(header, progress)),
         false => earlier.kept_for(header, has_plan, progress_of_tasks),
     });
-    if let (Some(earlier), false) = (&kept, is_by_tasks || is_update) {
+    if let (Some(earlier), true) = (&mut kept, is_update) {
+        let stage = progress.stage("check", earlier.parts.len(), "phases");
+        let damaged = earlier.parts.drop_damaged(&stage)?;
+        stage.finish();
+        if damaged > 0 {
+            progress.note(&format!(
+                "what the last run left of {} is damaged, and is computed again",
+                counted(damaged, "part")
+            ));
+            earlier.has_dropped = true;
+        }
+    } else if let (Some(earlier), false) = (&kept, is_by_tasks) {
         let stage = progress.stage("check", earlier.parts.len(), "phases");
         let mut files = earlier.entries.iter().flat_map(|entry| &entry.files);
         let of_job = files.try_fold(true, |all, file| Ok::<_, Error>(all && file.try_is_whole(directory)?))?;

@@ -48,8 +48,7 @@ impl<'a> WholeRun<'a> {
             threads: self.threads,
             clock: self.clock,
             id: self.job_id,
-            // What an update needs was brought to the disk before its phase was complete.
-            checks_points: self.resumed > 0 && !plan.options.updates,
+            checks_points: self.resumed > 0 || plan.options.updates,
             is_task: false,
         }
     }

@@ -1,7 +1,7 @@
 //! Step 7: the coarser tiles of a part, and those above the parts.
 
 use crate::index::{NodeIndex, PartIndex};
-use crate::levels::hierarchy::{Hierarchy, LevelSizes};
+use crate::levels::hierarchy::Hierarchy;
 use crate::levels::make_level::{LevelContext, LevelStats, TopOf, level_memory, make_level};
 use crate::partition::result::Partition;
 use crate::plan::job_plan::Plan;
@@ -10,7 +10,9 @@ use crate::run::done::Done;
 use crate::run::folder::{Folder, done_with, once};
 use crate::run::job::Job;
 use crate::run::phases::join::JoinedParts;
-use crate::run::phases::outdated_levels::{MadeLevel, forget_outdated_levels, key_of_tiles, keys_of_levels};
+use crate::run::phases::outdated_levels::{
+    MadeLevel, forget_outdated_levels, key_of_tiles, keys_of_levels, level_sizes,
+};
 use crate::run::phases::part_store::PartStores;
 use crate::tiles::style::TileStyle;
 use rayon::prelude::*;
@@ -30,7 +32,7 @@ pub(crate) fn levels_of_part(
     has_tileset: bool,
 ) -> crate::Result<LevelStats> {
     let directory = &job.directory.part(part);
-    let key = key_of_tiles(job, &[part])?;
+    let key = key_of_tiles(job, &[part], has_tileset)?;
     if let Some(done) = done_with(job, directory, part, JobStep::Levels, key)? {
         return Ok(done);
     }
@@ -38,7 +40,7 @@ pub(crate) fn levels_of_part(
     // The store of the part grows, so what is open now must not be used again.
     stores.close(part);
     let hierarchy = hierarchy_of(job.plan, &open.partition);
-    forget_outdated_levels(job, directory, part, &hierarchy)?;
+    forget_outdated_levels(job, directory, part, &hierarchy, has_tileset)?;
     once(job, directory, part, JobStep::Levels, key, |folder| {
         if !has_tileset {
             return Ok(folder.record(JobStep::Levels, LevelStats::default(), Vec::new())?);
@@ -46,11 +48,6 @@ pub(crate) fn levels_of_part(
         let no_other = |other: PartIndex| Err(Error::Broken(format!("part {part} has no tile of part {other}")));
         make_levels(job, folder, part, &hierarchy, &joined.appearance.style, &no_other)
     })
-}
-
-/// Returns how large the coarser tiles of a job are to be.
-pub(crate) fn level_sizes(plan: &Plan) -> LevelSizes {
-    LevelSizes::new(plan.options.output.max_points_per_level_tile.0, plan.options.limits.memory.0)
 }
 
 /// Returns the coarser tiles of a part.

@@ -5,8 +5,9 @@ use crate::durable::atomic_file::remove_file;
 use crate::durable::directory::JobDirectory;
 use crate::durable::journal::PublishedFile;
 use crate::index::{NodeIndex, PartIndex};
-use crate::levels::hierarchy::{ChildTile, Hierarchy};
+use crate::levels::hierarchy::{ChildTile, Hierarchy, LevelSizes};
 use crate::levels::make_level::LevelStats;
+use crate::plan::job_plan::Plan;
 use crate::records::{JobStep, Journal, JournalEntry, StepRecord};
 use crate::run::done::Done;
 use crate::run::job::Job;
@@ -26,15 +27,16 @@ pub(crate) struct MadeLevel {
     pub(crate) stats: LevelStats,
 }
 
-/// Returns what tells the exact tiles of these parts from others, in a job that is to be updated; else 0.
+/// Returns what tells the exact tiles of these parts from others, and what coarser ones are made of them (none unless `has_tileset`), in a job
+/// that is to be updated; else 0.
 ///
 /// # Errors
 /// [`sys::Error::Io`] if a journal cannot be read.
-pub(crate) fn key_of_tiles(job: &Job, parts: &[PartIndex]) -> sys::Result<u64> {
+pub(crate) fn key_of_tiles(job: &Job, parts: &[PartIndex], has_tileset: bool) -> sys::Result<u64> {
     if !job.plan.options.updates {
         return Ok(0);
     }
-    let mut hasher = Xxh3::new();
+    let mut hasher = hasher_of_levels(job, has_tileset);
     for &part in parts {
         let entries = entries_of(&job.directory.part(part), job.header(part))?;
         let mut files: Vec<&PublishedFile> = files_of_tiles(&entries).collect();
@@ -43,6 +45,19 @@ pub(crate) fn key_of_tiles(job: &Job, parts: &[PartIndex]) -> sys::Result<u64> {
         lines.for_each(|line| hasher.update(line.as_bytes()));
     }
     Ok(hasher.digest())
+}
+
+/// Returns a hasher that has what all coarser tiles of a job depend on besides finer ones.
+fn hasher_of_levels(job: &Job, has_tileset: bool) -> Xxh3 {
+    let LevelSizes { sites, memory } = level_sizes(job.plan);
+    let mut hasher = Xxh3::new();
+    [sites, memory, u64::from(has_tileset)].iter().for_each(|value| hasher.update(&value.to_le_bytes()));
+    hasher
+}
+
+/// Returns how large the coarser tiles of a job are to be.
+pub(crate) fn level_sizes(plan: &Plan) -> LevelSizes {
+    LevelSizes::new(plan.options.output.max_points_per_level_tile.0, plan.options.limits.memory.0)
 }
 
 fn files_of_tiles(entries: &[JournalEntry]) -> impl Iterator<Item = &PublishedFile> {
@@ -62,7 +77,7 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
         files_of_tiles(&entries).map(|file| (file.name.as_path(), file.checksum)).collect();
     let mut keys = vec![0u64; hierarchy.tiles.len()];
     for index in hierarchy.by_height().into_iter().flatten() {
-        let mut hasher = Xxh3::new();
+        let mut hasher = hasher_of_levels(job, true);
         for &child in &hierarchy.tiles[index].children {
             match child {
                 ChildTile::Exact(tile) => {
@@ -71,7 +86,7 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
                     hasher.update(format!("{checksum}\n").as_bytes());
                 }
                 ChildTile::Coarse(finer) => hasher.update(&keys[finer].to_le_bytes()),
-                ChildTile::Part(part) => hasher.update(&key_of_tiles(job, &[part])?.to_le_bytes()),
+                ChildTile::Part(part) => hasher.update(&key_of_tiles(job, &[part], true)?.to_le_bytes()),
             }
         }
         keys[index] = hasher.digest();
@@ -89,16 +104,18 @@ pub(crate) fn forget_outdated_levels(
     directory: &JobDirectory,
     part: PartIndex,
     hierarchy: &Hierarchy,
+    has_tileset: bool,
 ) -> Result<()> {
     if !job.plan.options.updates {
         return Ok(());
     }
-    let keys = keys_of_levels(job, part, hierarchy)?;
+    let keys = if has_tileset { keys_of_levels(job, part, hierarchy)? } else { Vec::new() };
     let keys: HashMap<NodeIndex, u64> = hierarchy.tiles.iter().map(|tile| tile.node).zip(keys).collect();
     let is_whole = |made: &MadeLevel| keys.get(&made.node) == Some(&made.key);
     let _lock = directory.lock_within()?;
     let (mut outdated, mut kept) = (HashSet::<PathBuf>::new(), Vec::new());
-    for mut entry in entries_of(directory, job.header(part))? {
+    for mut entry in entries_of(directory, job.header(part))?.into_iter().filter(|entry| entry.step != JobStep::Levels)
+    {
         if entry.step == JobStep::LevelTiles {
             let mut done = entry.figures::<Done<Vec<MadeLevel>>>()?;
             let gone: HashSet<NodeIndex> =

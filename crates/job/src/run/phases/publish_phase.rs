@@ -31,8 +31,8 @@ use crate::run::folder::{Folder, done_with};
 use crate::run::job::Job;
 use crate::run::part_entries::PartJournals;
 use crate::run::phases::join::JoinedParts;
-use crate::run::phases::level_phase::{hierarchy_of, left_out_warning, level_sizes, make_levels};
-use crate::run::phases::outdated_levels::{forget_outdated_levels, key_of_tiles};
+use crate::run::phases::level_phase::{hierarchy_of, left_out_warning, make_levels};
+use crate::run::phases::outdated_levels::{forget_outdated_levels, key_of_tiles, level_sizes};
 use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::part_store::PartStores;
 use crate::run::phases::read_phase::sum_up;
@@ -74,7 +74,13 @@ pub(crate) fn publish_job(
     some_triangles(&figures.tiles, job.plan)?;
     let (summary, bounds) = sum_up(job, parts.iter().filter_map(|part| part.read.as_ref()))?;
     add_stages(run, joined, &parts);
-    let tileset = wants_tileset(job.plan, &figures.tiles).then(|| levels_and_root(run, job, stores, joined, &figures));
+    let wants_tileset = wants_tileset(job.plan, &figures.tiles);
+    if !wants_tileset && parts.len() > 1 {
+        // A run before may have had one.
+        let hierarchy = Hierarchy::above_parts(&job.parts.tree, &figures.points, level_sizes(job.plan));
+        forget_outdated_levels(job, &job.directory.join(), job.above(), &hierarchy, false)?;
+    }
+    let tileset = wants_tileset.then(|| levels_and_root(run, job, stores, joined, &figures));
     let (tiles, hull) = (&TilesOfParts { job, stores }, joined.hull_count(job, stores)?);
     let written = WrittenFiles { stats: figures.tiles, hull, tiles };
     let mut published = publish(run, job, bounds, &written, &joined.appearance, tileset.transpose()?)?;
@@ -194,10 +200,10 @@ fn levels_and_root(
         root_of_part(job, stores, PartIndex::FIRST)?
     } else {
         let directory = &job.directory.join();
-        let key = key_of_tiles(job, &job.parts.all().collect::<Vec<PartIndex>>())?;
+        let key = key_of_tiles(job, &job.parts.all().collect::<Vec<PartIndex>>(), true)?;
         let done = done_with(job, directory, job.above(), JobStep::Levels, key)?;
         if done.is_none() {
-            forget_outdated_levels(job, directory, job.above(), &hierarchy)?;
+            forget_outdated_levels(job, directory, job.above(), &hierarchy, true)?;
         }
         let folder = Folder::open(job, directory, job.above())?.with_key(key);
         let top_of = |part: PartIndex| {

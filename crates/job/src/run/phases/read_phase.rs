@@ -45,6 +45,18 @@ pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<R
 /// # Errors
 /// [`Error::DamagedSteps`] if points are damaged, [`sys::Error::Io`] if what a reader wrote down cannot be read.
 pub(crate) fn points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPart<'a>> {
+    let points = listed_points_of(job, part)?;
+    if job.checks_points && !points.are_whole(&job.directory.part(part))? {
+        return Err(Error::DamagedSteps);
+    }
+    Ok(points)
+}
+
+/// As [`points_of`], whether the points are damaged or not.
+///
+/// # Errors
+/// [`sys::Error::Io`] if what a reader wrote down cannot be read.
+pub(crate) fn listed_points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPart<'a>> {
     let mut points = PointsOfPart::none(job.plan, job.parts, part);
     for reader in job.parts.readers_of(part) {
         let directory = job.directory.part(reader);
@@ -53,9 +65,6 @@ pub(crate) fn points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPa
         let read = read.ok_or_else(|| sys::Error::Broken(format!("the inputs of part {reader} were not read")))?;
         let store = open_store(&directory, records_of(&entries).into_values())?;
         points.add(reader, &store, &read.figures::<Done<ReadInputs>>()?.figures)?;
-    }
-    if job.checks_points && !points.are_whole(&job.directory.part(part))? {
-        return Err(Error::DamagedSteps);
     }
     Ok(points)
 }

@@ -14,7 +14,7 @@ use crate::run::done::Done;
 use crate::run::folder::Folder;
 use crate::run::job::Job;
 use crate::run::part_entries::{entries_of, open_store};
-use crate::run::phases::read_phase::points_of;
+use crate::run::phases::read_phase::{listed_points_of, points_of};
 use crate::run::update::outdated::forget_from;
 use crate::{Error, Result};
 use delaunay::geometry::Site;
@@ -129,7 +129,7 @@ fn key_of_all_points(job: &Job) -> Result<u64> {
     if !job.plan.options.updates {
         return Ok(0);
     }
-    job.parts.all().try_fold(0u64, |all, part| Ok(all.wrapping_add(points_of(job, part)?.digest())))
+    job.parts.all().try_fold(0u64, |all, part| Ok(all.wrapping_add(listed_points_of(job, part)?.digest())))
 }
 
 /// Tells the plan what the selection has found, if it is done. Later phases of jobs that have one fail without.
@@ -170,7 +170,7 @@ pub(crate) fn key_of_vertices(job: &Job, part: PartIndex) -> Result<u64> {
         return Ok(0);
     }
     if !selects(job.plan) {
-        return Ok(points_of(job, part)?.digest());
+        return Ok(listed_points_of(job, part)?.digest());
     }
     let entries = entries_of(&job.directory.part(part), job.header(part))?;
     let selected = entries.iter().find(|entry| entry.step == JobStep::Select);

@@ -1,6 +1,6 @@
 //! `update.json`: which results of an update are other than those of the run before it, for a web server or a cache.
 
-use crate::durable::atomic_file::{partial_path, publish, write_pending};
+use crate::durable::atomic_file::{publish, write_pending};
 use crate::durable::directory::JobDirectory;
 use crate::publish::side_files::EachTile;
 use crate::records::{StepRecord, Store, TileSummary};
@@ -14,7 +14,7 @@ use sys::{Error, Result, disk};
 use tiles::checksums::{Checksum, parse_list, read_file};
 
 /// What has changed. Paths are from the output directory, with slashes.
-#[derive(Debug, PartialEq, Serialize)]
+#[derive(Debug, Default, PartialEq, Serialize)]
 struct Changes {
     /// Results that were there before and hold something else now.
     changed: Vec<String>,
@@ -51,13 +51,19 @@ pub(crate) fn write_changes(
         Ok(())
     })?;
     changes.areas = areas;
-    let path = directory.changes();
-    let text = serde_json::to_vec_pretty(&changes).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
-    write_pending(&path, &text)?;
-    publish(std::slice::from_ref(&path))?;
+    changes.write(directory)?;
     let [changed, added, removed] =
         [&changes.changed, &changes.added, &changes.removed].map(|names| names.len() as u64);
     Ok(Some(ChangeCounts { changed, added, removed }))
+}
+
+/// Writes that nothing has changed, and puts that in its place.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be written.
+pub(crate) fn place_no_changes(directory: &JobDirectory) -> Result<()> {
+    Changes::default().write(directory)?;
+    place_changes(directory)
 }
 
 /// Puts the list of changes in its place, if one waits.
@@ -67,7 +73,7 @@ pub(crate) fn write_changes(
 pub(crate) fn place_changes(directory: &JobDirectory) -> Result<()> {
     let (waits, place) = (directory.changes(), directory.results().changes());
     match disk::exists(&waits).map_err(Error::io("read", &waits))? {
-        true => disk::link(&waits, &place, &partial_path(&place)).map_err(Error::io("write", &place)),
+        true => disk::link(&waits, &place, &directory.on_the_way()).map_err(Error::io("write", &place)),
         false => Ok(()),
     }
 }
@@ -80,6 +86,13 @@ fn list_in(path: &Path) -> Result<Option<BTreeMap<String, Checksum>>> {
 }
 
 impl Changes {
+    fn write(&self, directory: &JobDirectory) -> Result<()> {
+        let path = directory.changes();
+        let text = serde_json::to_vec_pretty(self).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
+        write_pending(&path, &text)?;
+        publish(std::slice::from_ref(&path))
+    }
+
     fn between(old: &BTreeMap<String, Checksum>, new: &[(String, Checksum)]) -> Changes {
         let names: BTreeSet<&String> = new.iter().map(|(name, _)| name).collect();
         let those = |is_wanted: &dyn Fn(&String, &Checksum) -> bool| {
