@@ -27,7 +27,7 @@ pub struct JobOptions {
     /// What the job may use of the machine.
     pub limits: Limits,
     /// Whether the job keeps what a later run needs that does only what has changed since.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub updates: bool,
     /// What the user should know about the options themselves.
     #[serde(default, skip_serializing_if = "Warnings::is_empty")]
