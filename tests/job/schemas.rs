@@ -90,7 +90,7 @@ fn mixed_inputs(folder: &Path) -> Job {
 fn add_jobs_of_one_part(documents: &Documents) {
     let folder = tempfile::tempdir().unwrap();
     let mixed = documents.run(&mixed_inputs(folder.path()));
-    assert!(["bad row", "no point is left of it", "damaged.las"].iter().all(|words| mixed.contains(words)), "{mixed}");
+    assert!(["bad row", "no point of it is used", "damaged.las"].iter().all(|words| mixed.contains(words)), "{mixed}");
     let (_survey, job) = with_doubtful_heights();
     documents.run(&job);
     let (_cloud, clipped) = clipped();
@@ -142,6 +142,9 @@ fn add_a_job_of_parts(documents: &Documents) {
     documents.status(&job, &[], "done");
     documents.verify(&job, &[], "proved");
     documents.status(&job.with("output", "max_edge = 900.0"), &[], "other-results");
+    let updated = in_parts(&files, 2_000);
+    updated.run_with(&["--update", "--quiet"]).succeeded();
+    documents.add("report", &updated.run_with(&["--update", "--json", "--quiet"]).succeeded().out);
     let whole = Job::on(&files);
     task(&whole, "plan", "1/1");
     documents.status(&whole, &[], "left-to-publish");
