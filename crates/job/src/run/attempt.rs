@@ -31,7 +31,7 @@ use crate::run::part_entries::PartJournals;
 use crate::run::phases::do_phases;
 use crate::run::phases::plan_phase::note_skipped;
 use crate::run::phases::stage_costs::stage_costs;
-use crate::run::update::changes::place_no_changes;
+use crate::run::update::changes::end_without_changes;
 use crate::run::update::first_plan_file::has_first_plan;
 use crate::run::whole_run::WholeRun;
 use crate::tiles::vertex_colors::check_photo;
@@ -226,8 +226,11 @@ fn attempt(
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
         if options.updates {
+            if end_without_changes(directory)? {
+                progress.note("the interrupted run had written all its results");
+                return Ok(report);
+            }
             progress.note("nothing has changed since the last run");
-            place_no_changes(directory)?;
             return Ok(Report { update: Some(ChangeCounts::default()), ..report });
         }
         progress.note("the last run had written all its results");

@@ -1,6 +1,6 @@
 //! `update.json`: which results of an update are other than those of the run before it, for a web server or a cache.
 
-use crate::durable::atomic_file::{publish, write_pending};
+use crate::durable::atomic_file::{publish, remove_file, write_pending};
 use crate::durable::directory::JobDirectory;
 use crate::publish::side_files::EachTile;
 use crate::records::{StepRecord, Store, TileSummary};
@@ -57,13 +57,20 @@ pub(crate) fn write_changes(
     Ok(Some(ChangeCounts { changed, added, removed }))
 }
 
-/// Writes that nothing has changed, and puts that in its place.
+/// Ends a run that has found nothing changed. Unless the list of a run waits that was interrupted while its results took their places, the list in
+/// place becomes empty. Returns whether one did.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be written.
-pub(crate) fn place_no_changes(directory: &JobDirectory) -> Result<()> {
-    Changes::default().write(directory)?;
-    place_changes(directory)
+/// [`Error::Io`] if the list cannot be written.
+pub(crate) fn end_without_changes(directory: &JobDirectory) -> Result<bool> {
+    let waits = directory.changes();
+    let was_interrupted = disk::exists(&waits).map_err(Error::io("read", &waits))?;
+    if !was_interrupted {
+        Changes::default().write(directory)?;
+    }
+    place_changes(directory)?;
+    remove_file(&waits)?;
+    Ok(was_interrupted)
 }
 
 /// Puts the list of changes in its place, if one waits.
