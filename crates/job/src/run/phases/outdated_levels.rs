@@ -94,8 +94,8 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
     Ok(keys)
 }
 
-/// In a job that is to be updated, takes the coarser tiles whose finer tiles are others now out of the journal of `part`, or of the nodes above the parts, whose folder is
-/// `directory`.
+/// In a job that is to be updated, takes the coarser tiles whose finer tiles are others now out of the journal of `part`, or of the nodes
+/// above the parts, whose folder is `directory`; all of them unless the job `has_tileset`.
 ///
 /// # Errors
 /// [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
