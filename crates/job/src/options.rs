@@ -38,7 +38,7 @@ pub struct JobOptions {
 /// threads on two processors take an eighth more processor time than two.
 const MOST_PER_PROCESSOR: usize = 2;
 
-/// About how many points a part has of a job that is to be updated: about those of one file of a survey. A change takes the parts that it
+/// About how many points a part has of a job with `--update`: about those of one file of a survey. A change takes the parts that it
 /// touches; smaller parts take more time for what is between them.
 const POINTS_PER_PART_OF_UPDATES: MaxPointsPerPart = MaxPointsPerPart(1_000_000);
 

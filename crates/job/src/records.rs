@@ -46,7 +46,7 @@ pub enum JobStep {
     Merge(NodeIndex),
     /// Merges at all nodes above the parts, and finds out how tiles look.
     Join,
-    /// Makes some of the coarser tiles of a part, or of those above the parts, in a job that is to be updated.
+    /// Makes some of the coarser tiles of a part, or of those above the parts, with `--update`.
     LevelTiles,
     /// Makes the coarser tiles of a part, or those above the parts.
     Levels,

@@ -88,7 +88,7 @@ impl JobDirectory {
         self.job.join("plan.json")
     }
 
-    /// Returns the path of the plan of the first run of a job that is to be updated.
+    /// Returns the path of the plan of the first run of a job with `--update`.
     pub fn first_plan(&self) -> PathBuf {
         self.job.join("first-plan.json")
     }
@@ -257,7 +257,7 @@ impl JobDirectory {
     }
 
     /// Puts the results with these `names`, which wait, in the place of the results of an earlier job. Goes on where an earlier call
-    /// was cut off. If this succeeds, all of them are in place. In a job that is to be updated they stay where they wait, too.
+    /// was cut off. If this succeeds, all of them are in place. With `--update` they stay where they wait, too.
     ///
     /// # Errors
     /// [`Error::Io`] if a file is missing, or cannot be renamed or removed.

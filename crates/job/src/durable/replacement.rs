@@ -64,19 +64,14 @@ impl Replacement {
             let [place, waits] = [results, waiting].map(|folder| folder.directory().join(name));
             if exists(&waits)? {
                 known.check_place(name, &waits, &place)?;
-                found.push((waits, place));
+                if on_the_way.is_none() || !is_in_place(&waits, &place)? {
+                    found.push((waits, place));
+                }
             } else if waits == new_report || !exists(&place)? {
                 let gone =
                     io::Error::new(io::ErrorKind::NotFound, "it is gone, and it is not among the results either");
                 return Err(Error::io("read", &waits)(gone));
             }
-        }
-        if on_the_way.is_some() {
-            let others =
-                found.iter().map(|(waits, place)| Ok((!is_in_place(waits, place)?, waits.clone(), place.clone())));
-            let others = others.collect::<Result<Vec<_>>>()?;
-            found =
-                others.into_iter().filter(|(is_other, ..)| *is_other).map(|(_, waits, place)| (waits, place)).collect();
         }
         let has_others = !found.is_empty();
         found.retain(|(waits, _)| *waits != new_report);
@@ -85,9 +80,9 @@ impl Replacement {
         let mut outdated = Vec::new();
         for path in Leftovers::of(results)?.files {
             let name = path.strip_prefix(results.directory()).unwrap_or(&path);
-            // A file that no list names is foreign.
-            // An update replaces the list of what the one before has changed itself.
+            // An update replaces the list of changes of the one before itself.
             let stays = path == report || on_the_way.is_some() && path == results.changes();
+            // A file that no list names is foreign.
             if !stays && !names.contains(name) && known.contains(name) && exists(&path)? {
                 outdated.push(path);
             }

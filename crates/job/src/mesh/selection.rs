@@ -126,7 +126,7 @@ pub(crate) struct WrittenPoints {
     pub(crate) wanted: u64,
     /// Those of them that were dropped because another has the same x and y.
     pub(crate) duplicates: u64,
-    /// Tells the points that were written from others, in a job that is to be updated.
+    /// The digest of the points that were written, with `--update`.
     pub(crate) digest: u64,
 }
 

@@ -15,7 +15,7 @@ pub struct Bucket {
     pub blocks: Vec<PointBlock>,
     /// The number of points in them.
     pub points: u64,
-    /// Tells these points from others, whatever their order; 0 unless [`Buckets::with_digests`] wants it.
+    /// The digest of the points: the sum of their hashes, so their order does not matter. 0 unless [`Buckets::with_digests`] wants it.
     pub digest: u64,
 }
 

@@ -36,7 +36,7 @@ pub struct PointsForPart {
     blocks: u64,
     /// Their bytes.
     pub bytes: u64,
-    /// Tells these points from others, in a job that is to be updated.
+    /// The digest of these points, with `--update`.
     #[serde(default)]
     digest: u64,
 }
@@ -233,7 +233,7 @@ pub struct PointsOfPart<'a> {
     are_selected: bool,
     /// The blocks, each with the number of its bucket.
     blocks: Vec<(u32, PointBlock)>,
-    /// Tells the points from others, in a job that is to be updated.
+    /// The digest of the points, with `--update`.
     digest: u64,
 }
 
@@ -278,7 +278,7 @@ impl<'a> PointsOfPart<'a> {
         Ok(())
     }
 
-    /// Returns what tells the points from others, in a job that is to be updated.
+    /// Returns the digest of the points, with `--update`: it does not depend on their order.
     pub(crate) fn digest(&self) -> u64 {
         self.digest
     }

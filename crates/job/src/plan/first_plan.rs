@@ -1,4 +1,4 @@
-//! What an update takes over from the plan of the first run, and what tells its inputs from those of earlier runs.
+//! What an update takes over from the plan of the first run, and the keys of its inputs.
 
 use crate::plan::fingerprint::Fingerprint;
 use crate::plan::job_plan::{Claims, Plan, PlannedInput};
@@ -8,8 +8,8 @@ use sys::{Error, Result};
 use xxhash_rust::xxh3::xxh3_64;
 
 impl Plan {
-    /// Returns this plan with what tells the points of each input from others: its content, as `fingerprint` knows it, and how its points come
-    /// to the lattice. Where points have no numbers, those of other files have no say in it.
+    /// Returns this plan with a key for each input: a hash of its content, as `fingerprint` knows it, and of how its points come to the
+    /// lattice. Where points have no numbers, those of other files have no say in it.
     ///
     /// # Errors
     /// [`Error::Broken`] if an input cannot be described.
@@ -24,7 +24,7 @@ impl Plan {
         Ok(self)
     }
 
-    /// Returns what tells the points of these inputs from others, in a job that is to be updated; else 0.
+    /// Returns the key of reading these inputs, with `--update`: a hash of their keys. Else 0.
     pub(crate) fn key_of_inputs(&self, inputs: &[usize]) -> u64 {
         let keys: Vec<u64> = inputs.iter().map(|&input| self.inputs[input].key).collect();
         if self.options.updates { xxh3_64(bytemuck::cast_slice(&keys)) } else { 0 }
@@ -60,7 +60,7 @@ impl Plan {
 }
 
 impl Claims {
-    /// By how much of their greatest extent on the plane the claims of a job that is to be updated reach beyond what headers claim.
+    /// By how much of their greatest extent on the plane the claims of a job with `--update` reach beyond what headers claim.
     const ROOM: i64 = 256;
 
     /// Returns the claims with some room for files that are to come: a flight of the same area ends elsewhere by some metres, and finds

@@ -92,7 +92,7 @@ pub struct PlannedInput {
     pub rules: PointRules,
     /// The lattice box of its points, as far as its header tells.
     pub claimed: Bounds<2>,
-    /// In a job that is to be updated, what tells its points from those of other files, or of this one at other times; else 0.
+    /// With `--update`, its key: a hash of its content, and of how its points come to the lattice. Else 0.
     #[serde(default)]
     pub(crate) key: u64,
 }

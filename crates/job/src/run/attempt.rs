@@ -297,7 +297,7 @@ struct EndedRun<'a> {
     phases: u64,
     is_by_tasks: bool,
     keeps_mesh: bool,
-    /// Whether the job is to be updated.
+    /// Whether the job has `--update`.
     updates: bool,
     /// Whether it was an update.
     is_update: bool,

@@ -13,7 +13,7 @@ pub(crate) struct Done<T> {
     /// The largest resident set of that process, in bytes, up to the end of the phase.
     pub(crate) peak_memory: Option<u64>,
     pub(crate) stages: Vec<StageStats>,
-    /// In a job that is to be updated, what tells that which the phase was done with from what it would be done with now; else 0.
+    /// With `--update`, the key: a hash of everything that the phase was done with. It is done again if that has another key now. Else 0.
     #[serde(default)]
     pub(crate) key: u64,
 }

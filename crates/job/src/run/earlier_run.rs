@@ -85,8 +85,8 @@ impl EarlierRun {
         place_changes(directory)
     }
 
-    /// Returns the plan of the first run, if the job with `header` is an update of this one: its mesh depends on the same options, and both
-    /// are to be updated.
+    /// Returns the plan of the first run, if the job with `header` is an update of this one: both have `--update`, and their meshes depend on the
+    /// same options.
     pub(crate) fn first_plan(&self, directory: &JobDirectory, header: &JobHeader) -> Option<Plan> {
         let old = self.header.as_ref().filter(|old| old.coarsening == header.coarsening)?;
         let is_update = header.fingerprint.updates() && header.fingerprint.may_update(&old.fingerprint);

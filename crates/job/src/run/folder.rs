@@ -9,7 +9,7 @@ use crate::progress::stats::StageStats;
 use crate::records::{JobStep, Journal, NewEntry, Store};
 use crate::run::done::Done;
 use crate::run::job::Job;
-use crate::run::part_entries::{entries_of, open_store};
+use crate::run::part_entries::{entry_of, open_store};
 use crate::run::update::outdated::forget_from;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -67,8 +67,7 @@ pub(crate) fn done_with<T: DeserializeOwned>(
     step: JobStep,
     key: u64,
 ) -> crate::Result<Option<T>> {
-    let entries = entries_of(directory, job.header(part))?;
-    let Some(entry) = entries.iter().find(|entry| entry.step == step) else { return Ok(None) };
+    let Some(entry) = entry_of(directory, job.header(part), step)? else { return Ok(None) };
     let done = entry.figures::<Done<T>>()?;
     if done.key == key {
         return Ok(Some(done.figures));

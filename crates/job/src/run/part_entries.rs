@@ -29,6 +29,14 @@ pub(crate) fn entries_of(directory: &JobDirectory, header: PartHeader) -> Result
     Ok(own.map(|(_, entries)| entries).unwrap_or_default())
 }
 
+/// Returns the entry of `step` in the journal in `directory` if it is that of `header`, and has one.
+///
+/// # Errors
+/// As [`entries_of`].
+pub(crate) fn entry_of(directory: &JobDirectory, header: PartHeader, step: JobStep) -> Result<Option<JournalEntry>> {
+    Ok(entries_of(directory, header)?.into_iter().find(|entry| entry.step == step))
+}
+
 /// The journals of all parts of a job, and of the nodes above them.
 #[derive(Default)]
 pub(crate) struct PartJournals(pub(crate) Vec<(JobDirectory, PartHeader, Vec<JournalEntry>)>);

@@ -11,7 +11,7 @@ use crate::records::{JobStep, StepRecord, Store};
 use crate::run::done::Done;
 use crate::run::folder::{Folder, once};
 use crate::run::job::Job;
-use crate::run::part_entries::{entries_of, open_store};
+use crate::run::part_entries::{entries_of, entry_of, open_store};
 use crate::run::phases::appearance::{SitesOfParts, count_sites, early_appearance, final_appearance};
 use crate::run::phases::part_store::{OpenPart, PartStores};
 use crate::run::phases::tile_queue::TileAppearance;
@@ -32,7 +32,7 @@ pub(crate) struct JoinedParts {
     pub(crate) stages: Vec<StageStats>,
     /// The largest resident set of the process that merged, in bytes.
     pub(crate) peak_memory: Option<u64>,
-    /// In a job that is to be updated, what tells the rule for long triangles from others.
+    /// The key of the rule for long triangles, with `--update`.
     key_of_rule: u64,
 }
 
@@ -61,15 +61,14 @@ pub(crate) fn join_parts(job: &Job, stores: &PartStores, all: SitesOfParts) -> c
     .map(|_| ())
 }
 
-/// Returns what tells the meshes of all parts from others, in a job that is to be updated; else 0.
+/// Returns the key of the merges above the parts, with `--update`: a hash of the keys of all meshes. Else 0.
 fn key_of_meshes(job: &Job) -> Result<u64> {
     if !job.plan.options.updates {
         return Ok(0);
     }
     let mut keys = Vec::new();
     for part in job.parts.all() {
-        let entries = entries_of(&job.directory.part(part), job.header(part))?;
-        if let Some(mesh) = entries.iter().find(|entry| entry.step == JobStep::Mesh) {
+        if let Some(mesh) = entry_of(&job.directory.part(part), job.header(part), JobStep::Mesh)? {
             keys.push(mesh.figures::<Done<IgnoredAny>>()?.key);
         }
     }
@@ -200,8 +199,7 @@ impl JoinedParts {
         Ok(seam)
     }
 
-    /// Returns what tells that which merges above the parts have of `tile` from what others would have, and the rule for long triangles
-    /// from others.
+    /// Returns the key of `tile`: a hash of what the merges above the parts have of it, and of the rule for long triangles.
     ///
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store.

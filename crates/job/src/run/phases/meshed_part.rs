@@ -35,7 +35,7 @@ pub(crate) struct SomeTiles {
     pub(crate) written: Vec<TileIndex>,
     /// Tiles whose borders are finished, each with the tiles that must be finished before it can be written.
     pub(crate) with_border: Vec<(TileIndex, Vec<TileIndex>)>,
-    /// In a job that is to be updated, what is known of each tile that has waited for other parts.
+    /// With `--update`, what is known of each tile that has waited for other parts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) waited: Vec<WaitedTile>,
 }
@@ -45,7 +45,7 @@ pub(crate) struct SomeTiles {
 pub(crate) struct WaitedTile {
     pub(crate) tile: TileIndex,
     pub(crate) stats: TileStats,
-    /// Tells what these merges have of the tile from what others would have.
+    /// A hash of what these merges have of the tile.
     pub(crate) key: u64,
     /// The tiles whose borders it shows.
     pub(crate) neighbours: Vec<TileIndex>,

@@ -101,7 +101,7 @@ fn read_and_mesh(job: &Job, stores: &PartStores) -> Result<SitesOfParts> {
         select_vertices(job)?;
     }
     let appearance = early_appearance(job)?;
-    // A job that is to be updated keeps everything, and compares the tiles that wait with those of its last run.
+    // A job with `--update` keeps everything, and compares the tiles that wait with those of its last run.
     let waits = appearance.clone().filter(|_| !job.plan.options.updates);
     let mut front = waits.map(|appearance| WaitingTiles::new(job, stores, appearance));
     for part in job.parts.all() {

@@ -18,17 +18,17 @@ use std::path::{Path, PathBuf};
 use tiles::checksums::Checksum;
 use xxhash_rust::xxh3::Xxh3;
 
-/// A coarser tile that is made, in a job that is to be updated.
+/// A coarser tile that is made, with `--update`.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct MadeLevel {
     pub(crate) node: NodeIndex,
-    /// Tells the tiles below it from others.
+    /// A hash of the checksums of the tiles below it.
     pub(crate) key: u64,
     pub(crate) stats: LevelStats,
 }
 
-/// Returns what tells the exact tiles of these parts from others, and what coarser ones are made of them (none unless `has_tileset`), in a job
-/// that is to be updated; else 0.
+/// Returns the key of the coarser tiles of these parts, with `--update`: a hash of the checksums of the exact ones, and of what coarser ones are
+/// made of them (none unless `has_tileset`). Else 0.
 ///
 /// # Errors
 /// [`sys::Error::Io`] if a journal cannot be read.
@@ -64,7 +64,7 @@ fn files_of_tiles(entries: &[JournalEntry]) -> impl Iterator<Item = &PublishedFi
     entries.iter().filter(|entry| entry.step == JobStep::Tiles).flat_map(|entry| &entry.files)
 }
 
-/// Returns the key of each coarser tile of `hierarchy`, which is that of `part`, in a job that is to be updated; none else.
+/// Returns the key of each coarser tile of `hierarchy`, which is that of `part`, with `--update`; none else.
 ///
 /// # Errors
 /// [`sys::Error::Io`] if a journal cannot be read.
@@ -94,7 +94,7 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
     Ok(keys)
 }
 
-/// In a job that is to be updated, takes the coarser tiles whose finer tiles are others now out of the journal of `part`, or of the nodes
+/// With `--update`, takes the coarser tiles whose finer tiles are others now out of the journal of `part`, or of the nodes
 /// above the parts, whose folder is `directory`; all of them unless the job `has_tileset`.
 ///
 /// # Errors

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-/// Takes the tiles that are outdated out of the journals of their parts, in a job that is to be updated. All parts are meshed and joined.
+/// Takes the tiles that are outdated out of the journals of their parts, with `--update`. All parts are meshed and joined.
 ///
 /// # Errors
 /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a folder, [`crate::Error::InUse`] if another process has one.

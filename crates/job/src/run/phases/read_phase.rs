@@ -11,7 +11,7 @@ use crate::records::JobStep;
 use crate::run::done::Done;
 use crate::run::folder::once;
 use crate::run::job::Job;
-use crate::run::part_entries::{entries_of, open_store};
+use crate::run::part_entries::{entries_of, entry_of, open_store};
 use crate::run::update::outdated::forget_from;
 use crate::{Error, Result};
 use delaunay::geometry::Bounds;
@@ -24,9 +24,7 @@ pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<R
     let Job { plan, parts, .. } = *job;
     let (inputs, directory) = (parts.new_inputs(reader), &job.directory.part(reader));
     if inputs.is_empty() {
-        if plan.options.updates
-            && entries_of(directory, job.header(reader))?.iter().any(|entry| entry.step == JobStep::Read)
-        {
+        if plan.options.updates && entry_of(directory, job.header(reader), JobStep::Read)?.is_some() {
             forget_from(job, directory, reader, JobStep::Read)?;
         }
         return Ok(ReadInputs::default());

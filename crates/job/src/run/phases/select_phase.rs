@@ -11,11 +11,10 @@ use crate::plan::budget::working_memory;
 use crate::plan::job_plan::Plan;
 use crate::records::{JobStep, StepRecord, Store};
 use crate::run::done::Done;
-use crate::run::folder::Folder;
+use crate::run::folder::{Folder, done_with};
 use crate::run::job::Job;
-use crate::run::part_entries::{entries_of, open_store};
+use crate::run::part_entries::{entries_of, entry_of, open_store};
 use crate::run::phases::read_phase::{listed_points_of, points_of};
-use crate::run::update::outdated::forget_from;
 use crate::{Error, Result};
 use delaunay::geometry::Site;
 use ground::{Ground, GroundColumns};
@@ -37,7 +36,7 @@ pub(crate) struct SelectedPart {
     pub(crate) temporary: u64,
     /// The number of blocks that the selected points of this part are in.
     blocks: u64,
-    /// Tells the selected points from others, in a job that is to be updated.
+    /// The digest of the selected points, with `--update`.
     digest: u64,
 }
 
@@ -55,15 +54,7 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     let bound = error_bound(job.plan)?;
     let key = key_of_all_points(job)?;
     let is_done = |part| {
-        let entries = entries_of(&job.directory.part(part), job.header(part))?;
-        let done = entries.iter().find(|entry| entry.step == JobStep::Select);
-        match done.map(|entry| entry.figures::<Done<IgnoredAny>>()).transpose()? {
-            Some(done) if done.key != key => {
-                forget_from(job, &job.directory.part(part), part, JobStep::Select)?;
-                Ok(false)
-            }
-            done => Ok(done.is_some()),
-        }
+        done_with::<IgnoredAny>(job, &job.directory.part(part), part, JobStep::Select, key).map(|done| done.is_some())
     };
     if job.parts.all().map(is_done).collect::<Result<Vec<bool>>>()?.into_iter().all(|is_done| is_done) {
         return know_selection(job);
@@ -124,7 +115,7 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     Ok(())
 }
 
-/// Returns what tells the points of all parts from others, in a job that is to be updated; else 0.
+/// Returns the key of the selection, with `--update`: the digest of the points of all parts. Else 0.
 fn key_of_all_points(job: &Job) -> Result<u64> {
     if !job.plan.options.updates {
         return Ok(0);
@@ -161,7 +152,7 @@ pub(crate) fn found_ground(job: &Job) -> sys::Result<Ground> {
     Ground::of_columns(ground).ok_or_else(|| sys::Error::Broken("the ground has no heights".into()))
 }
 
-/// Returns what tells the vertices of a part from others, in a job that is to be updated; else 0.
+/// Returns the key of the mesh of a part, with `--update`: the digest of its vertices, and of the long triangles on ground among them. Else 0.
 ///
 /// # Errors
 /// As [`vertices_of`].
@@ -172,11 +163,7 @@ pub(crate) fn key_of_vertices(job: &Job, part: PartIndex) -> Result<u64> {
     if !selects(job.plan) {
         return Ok(listed_points_of(job, part)?.digest());
     }
-    let entries = entries_of(&job.directory.part(part), job.header(part))?;
-    let selected = entries.iter().find(|entry| entry.step == JobStep::Select);
-    let selected =
-        selected.ok_or_else(|| sys::Error::Broken(format!("the vertices of part {part} are not selected")))?;
-    let vertices = selected.figures::<Done<SelectedPart>>()?.figures.digest;
+    let vertices = selected_part(job, part)?.digest;
     let is_of_part = |triangle: &&[Site; 3]| {
         triangle.iter().any(|&site| job.parts.part_of(job.parts.grid.bucket(site) as usize) == part)
     };
@@ -184,6 +171,13 @@ pub(crate) fn key_of_vertices(job: &Job, part: PartIndex) -> Result<u64> {
         known.iter().filter(is_of_part).map(|triangle| xxh3_64(bytemuck::bytes_of(triangle))).collect::<Vec<u64>>()
     });
     Ok(on_ground.fold(vertices, u64::wrapping_add))
+}
+
+/// Returns what is known of a part whose vertices are selected.
+fn selected_part(job: &Job, part: PartIndex) -> sys::Result<SelectedPart> {
+    let entry = entry_of(&job.directory.part(part), job.header(part), JobStep::Select)?;
+    let entry = entry.ok_or_else(|| sys::Error::Broken(format!("the vertices of part {part} are not selected")))?;
+    Ok(entry.figures::<Done<SelectedPart>>()?.figures)
 }
 
 /// Returns the points of a part that are vertices: all, or those that are selected. `store` is that of the part.
@@ -195,10 +189,7 @@ pub(crate) fn vertices_of<'a>(job: &Job<'a>, part: PartIndex, store: &Store) -> 
         return points_of(job, part);
     }
     let directory = &job.directory.part(part);
-    let entries = entries_of(directory, job.header(part))?;
-    let entry = entries.iter().find(|entry| entry.step == JobStep::Select);
-    let entry = entry.ok_or_else(|| sys::Error::Broken(format!("the vertices of part {part} are not selected")))?;
-    let blocks = entry.figures::<Done<SelectedPart>>()?.figures.blocks;
+    let blocks = selected_part(job, part)?.blocks;
     let points = PointsOfPart::none(job.plan, job.parts, part).selected(store, blocks)?;
     if job.checks_points && !points.are_whole(directory)? {
         return Err(Error::DamagedSteps);

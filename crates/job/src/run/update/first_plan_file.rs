@@ -1,4 +1,4 @@
-//! The plan of the first run of a job that is to be updated, which decides how its plane is cut.
+//! The plan of the first run of a job with `--update`, which decides how its plane is cut.
 
 use crate::durable::atomic_file::publish;
 use crate::durable::directory::JobDirectory;
@@ -20,7 +20,7 @@ pub(crate) fn has_first_plan(directory: &JobDirectory) -> Result<bool> {
     exists(&path).map_err(Error::io("read", &path))
 }
 
-/// Keeps the plan of a job that is to be updated, unless that of an earlier run is there.
+/// Keeps the plan of a job with `--update`, unless that of an earlier run is there.
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be written.
