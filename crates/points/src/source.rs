@@ -10,12 +10,8 @@ use crate::decoded_chunks::DecodedChunks;
 use crate::ept::name::is_ept;
 use crate::ept::points::EptPoints;
 use crate::file::random_access::RandomAccessFile;
-use crate::las::crs_records;
-use crate::las::header::LasHeader;
-use crate::las::layout::RecordLayout;
 use crate::las::laz::CompressedPoints;
 use crate::las::uncompressed::UncompressedPoints;
-use crate::las::vlr;
 use crate::measured::{MeasuredPoints, PlausiblePoints};
 use crate::other_formats::refuse_other_formats;
 use crate::point_format::PointFormat;
@@ -36,7 +32,6 @@ use crate::text::options::TextOptions;
 use crate::text::outliers::Outliers;
 use crate::text::row_choice::RowChoice;
 use crate::text::table::TextTable;
-use crs::plausible::plausible;
 use crs::system::Crs;
 use crs::unit::Unit;
 use sys::{Error, Result, Warnings};
@@ -44,8 +39,10 @@ use sys::{Error, Result, Warnings};
 mod crs_origin;
 mod ept;
 mod geocentric;
+mod las;
 mod likely;
 mod nodata;
+mod text;
 mod transformed;
 
 /// How a file holds its points.
@@ -204,105 +201,18 @@ pub fn open_chosen(path: &Path, text: &TextOptions, choice: &RowChoice) -> Resul
     file.read_exact_at(&mut start[..held], 0)?;
     let start = &start[..held];
     let mut source = if start.starts_with(b"LASF") {
-        open_las(&file, choice)?
+        Source::open_las(&file, choice)?
     } else {
         refuse_other_formats(path, start)?;
-        open_text(&file, text, choice)?
+        Source::open_text(&file, text, choice)?
     };
     source.warnings.extend(file.doubt().map(str::to_string));
-    Ok(source)
-}
-
-fn open_las(file: &RandomAccessFile, choice: &RowChoice) -> Result<Source> {
-    let mut warnings = Warnings::default();
-    let header = LasHeader::read(file, &mut warnings)?;
-    let vlrs = vlr::list(file, &header, &mut warnings)?;
-    let crs = crs_records::read(file, &vlrs, &mut warnings)?;
-    // Bounds that no writer has filled in, or wrong ones, say nothing about the points.
-    let has_box = is_box(header.min, header.max) && [header.min, header.max] != [[0.0; 3]; 2];
-    let crs = if has_box { plausible(crs, header.min, header.max, &mut warnings) } else { crs };
-    let (missing, points) = if header.compressed {
-        let points = CompressedPoints::read(file, &header, &vlrs, choice.use_index, &mut warnings)?;
-        (points.missing, PointData::Laz(points))
-    } else {
-        let points = UncompressedPoints::new(&header, file.size());
-        (points.missing, PointData::Las(points))
-    };
-    if missing > 0 {
-        let held = header.records - missing;
-        warnings.push(format!(
-            "the header gives {} points, but the file has only {held}; fix: copy the file again",
-            header.records
-        ));
-    }
-    let mut source = Source {
-        path: file.path().to_path_buf(),
-        size: file.size(),
-        format: if header.compressed { FileFormat::Laz } else { FileFormat::Las },
-        version: Some([1, header.minor]),
-        point_format: Some(header.format),
-        records: header.records,
-        missing,
-        min: header.min,
-        max: header.max,
-        axes: header.axes,
-        grid: [header.axes[0].scale, header.axes[1].scale],
-        has_rgb: RecordLayout::new(header.format, header.record_length).has_rgb(),
-        has_class: true,
-        has_returns: true,
-        has_intensity: true,
-        crs,
-        unit_of_false_record: None,
-        by_return: header.by_return,
-        warnings,
-        transform: None,
-        nodata: Vec::new(),
-        kept_heights: None,
-        measured: None,
-        is_left_aside: false,
-        points,
-    };
-    source.drop_false_geocentric_crs(choice.is_crs_stated)?;
-    source.keep_heights(choice);
-    source.find_nodata(choice)?;
     Ok(source)
 }
 
 /// Returns whether these are the least and the greatest coordinates of something.
 pub(crate) fn is_box<const N: usize>(min: [f64; N], max: [f64; N]) -> bool {
     min.iter().zip(&max).all(|(min, max)| min <= max)
-}
-
-fn open_text(file: &RandomAccessFile, options: &TextOptions, choice: &RowChoice) -> Result<Source> {
-    let mut warnings = Warnings::default();
-    let table = TextTable::scan(file, options, choice, &mut warnings)?;
-    Ok(Source {
-        path: file.path().to_path_buf(),
-        size: file.size(),
-        format: FileFormat::Text,
-        version: None,
-        point_format: None,
-        records: table.records + table.missing,
-        missing: table.missing,
-        min: table.min,
-        max: table.max,
-        axes: table.axes(),
-        grid: table.grid(),
-        has_rgb: table.has_rgb(),
-        has_class: table.has_class(),
-        has_returns: table.has_returns(choice.returns),
-        has_intensity: table.has_intensity(),
-        crs: Crs { horizontal: table.unit, vertical: table.unit_z, ..Crs::default() },
-        unit_of_false_record: None,
-        by_return: Vec::new(),
-        warnings,
-        transform: None,
-        nodata: Vec::new(),
-        kept_heights: None,
-        measured: None,
-        is_left_aside: false,
-        points: PointData::Text(Box::new(table)),
-    })
 }
 
 impl Source {
