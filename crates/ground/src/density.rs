@@ -1,6 +1,6 @@
 //! How far apart the points of a cloud are.
 
-use crate::scale::Scale;
+use crate::metric_lattice::{MetricLattice, SquareCells};
 use std::collections::HashSet;
 
 /// The side of the least squares by which the area of a cloud is measured, in metres.
@@ -26,17 +26,17 @@ pub trait PointCollector: Sized + Send {
 /// The area that a cloud covers, and its points.
 #[derive(Clone, Debug)]
 pub struct CoveredArea {
-    pub(crate) scale: Scale,
-    /// The side of a square in lattice steps.
-    steps: i32,
+    pub(crate) lattice: MetricLattice,
+    cells: SquareCells,
     squares: HashSet<[i32; 2]>,
     points: u64,
 }
 
 impl CoveredArea {
     /// Returns that of a cloud without points.
-    pub fn new(scale: Scale) -> CoveredArea {
-        CoveredArea { scale, steps: scale.steps_of(LEAST_SIDE), squares: HashSet::new(), points: 0 }
+    pub fn new(lattice: MetricLattice) -> CoveredArea {
+        let cells = lattice.cells(lattice.steps_of(LEAST_SIDE));
+        CoveredArea { lattice, cells, squares: HashSet::new(), points: 0 }
     }
 
     /// Returns how far apart points are, in metres.
@@ -48,7 +48,7 @@ impl CoveredArea {
                 self.squares.iter().map(|square| square.map(|at| at.div_euclid(wider))).collect();
             count = wide.len();
         }
-        let side = f64::from(self.steps) * f64::from(wider) * self.scale.horizontal;
+        let side = f64::from(self.cells.steps) * f64::from(wider) * self.lattice.horizontal;
         (count as f64 * side * side / self.points.max(1) as f64).sqrt()
     }
 }
@@ -61,7 +61,7 @@ impl PointCollector for CoveredArea {
     fn add(&mut self, points: impl Iterator<Item = [i32; 3]>) {
         let mut last = None;
         for [x, y, _] in points {
-            let square = [x, y].map(|along| along.div_euclid(self.steps));
+            let square = self.cells.of([x, y]);
             self.points += 1;
             // Neighbours come one after the other.
             if last != Some(square) {
@@ -84,7 +84,7 @@ mod tests {
     #[test]
     fn points_of_a_lattice_are_as_far_apart_as_they_are() {
         for spacing in [50, 100, 700, 6_000, 1_000_000] {
-            let mut area = CoveredArea::new(Scale { horizontal: 0.01, vertical: 0.01 });
+            let mut area = CoveredArea::new(MetricLattice { horizontal: 0.01, vertical: 0.01, offset: [0; 2] });
             area.add((0..200 * 200).map(|n| [n % 200 * spacing, n / 200 * spacing, 0]));
             let found = area.spacing() / (0.01 * f64::from(spacing));
             assert!((0.8..1.25).contains(&found), "{spacing}: {found}");

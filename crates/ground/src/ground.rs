@@ -3,8 +3,8 @@
 use crate::cells::{Cells, SIDE, split};
 use crate::find::{GroundCells, allowed_distance, find_ground};
 use crate::lowest::{LowestHeights, metres_above};
+use crate::metric_lattice::{MetricLattice, SquareCells};
 use crate::morphology::EMPTY;
-use crate::scale::Scale;
 use crate::sizes::GroundSizes;
 use crate::slope::slopes;
 
@@ -42,9 +42,8 @@ pub struct GroundColumns {
 /// The ground of a cloud.
 #[derive(Debug)]
 pub struct Ground {
-    scale: Scale,
-    /// The width of a cell in lattice steps.
-    steps: i32,
+    lattice: MetricLattice,
+    squares: SquareCells,
     /// The lattice height that heights in metres count from.
     base: i32,
     tolerance: f32,
@@ -59,26 +58,42 @@ impl Ground {
     pub fn find<E>(lowest: &LowestHeights, sizes: GroundSizes, check: impl Fn() -> Result<(), E>) -> Result<Ground, E> {
         let (heights, base) = lowest.metres();
         let found = find_ground(&heights, lowest.width(), sizes, &check)?;
-        Ok(Ground::of(found, lowest.scale, lowest.steps, base, sizes.tolerance.0 as f32))
+        Ok(Ground::of(found, lowest.lattice, lowest.squares.steps, base, sizes.tolerance.0 as f32))
     }
 
-    fn of(GroundCells { surface, lowest }: GroundCells, scale: Scale, steps: i32, base: i32, tolerance: f32) -> Ground {
-        let width = (f64::from(steps) * scale.horizontal) as f32;
+    fn of(
+        GroundCells { surface, lowest }: GroundCells,
+        lattice: MetricLattice,
+        steps: i32,
+        base: i32,
+        tolerance: f32,
+    ) -> Ground {
+        let width = (f64::from(steps) * lattice.horizontal) as f32;
         let with_slopes = surface.with(&slopes(&surface, width), NOTHING, |height, slope| GroundCell {
             height,
             slope,
             lowest: EMPTY,
         });
         let cells = with_slopes.with(&lowest, NOTHING, |cell, lowest| GroundCell { lowest, ..cell });
-        Ground { scale, steps, base, tolerance, cells }
+        Ground { lattice, squares: lattice.cells(steps), base, tolerance, cells }
     }
 
     /// Returns all that there is to know of it.
     pub fn to_columns(&self) -> GroundColumns {
-        let Scale { horizontal, vertical } = self.scale;
+        let MetricLattice { horizontal, vertical, offset } = self.lattice;
+        // No number of steps is beyond 2^53.
+        let [x, y] = offset.map(|offset| offset as f64);
         let cells = || self.cells.values().flatten();
         GroundColumns {
-            numbers: vec![horizontal, vertical, self.steps.into(), self.base.into(), self.tolerance.into()],
+            numbers: vec![
+                horizontal,
+                vertical,
+                x,
+                y,
+                self.squares.steps.into(),
+                self.base.into(),
+                self.tolerance.into(),
+            ],
             places: self.cells.places().to_vec(),
             heights: cells().map(|cell| cell.height).chain(cells().map(|cell| cell.lowest)).collect(),
         }
@@ -86,27 +101,28 @@ impl Ground {
 
     /// Returns the ground that [`Ground::to_columns`] has described; `None` if it has not.
     pub fn of_columns(GroundColumns { numbers, places, heights }: GroundColumns) -> Option<Ground> {
-        let [horizontal, vertical, steps, base, tolerance] = <[f64; 5]>::try_from(numbers).ok()?;
+        let [horizontal, vertical, x, y, steps, base, tolerance] = <[f64; 7]>::try_from(numbers).ok()?;
+        let lattice = MetricLattice { horizontal, vertical, offset: [x as i64, y as i64] };
         let (surface, lowest) = heights.split_at(heights.len() / 2);
         let found = GroundCells {
             surface: Cells::of_blocks(EMPTY, places.clone(), surface)?,
             lowest: Cells::of_blocks(EMPTY, places, lowest)?,
         };
-        Some(Ground::of(found, Scale { horizontal, vertical }, steps as i32, base as i32, tolerance as f32))
+        Some(Ground::of(found, lattice, steps as i32, base as i32, tolerance as f32))
     }
 
     /// Tells whether a point, given as lattice integers, lies on it.
     pub fn has(&self, [x, y, z]: [i32; 3]) -> bool {
-        let cell = [x, y].map(|along| along.div_euclid(self.steps));
+        let cell = self.squares.of([x, y]);
         let (block, number) = split(cell);
         let Some(cells) = self.cells.block(block) else { return false };
         let own = cells[number];
-        let height = metres_above(self.base, z, self.scale);
+        let height = metres_above(self.base, z, self.lattice);
         if own.lowest != EMPTY && height >= own.lowest && height - own.lowest <= self.tolerance {
             return true;
         }
         // From the middle of the cell, in widths.
-        let off = [x, y].map(|along| along.rem_euclid(self.steps) as f32 / self.steps as f32 - 0.5);
+        let off = self.squares.within([x, y]).map(|along| along as f32 / self.squares.steps as f32 - 0.5);
         let to = off.map(|off| if off < 0.0 { -1 } else { 1 });
         let at = |right: i32, up: i32| {
             let [column, row] = [number as i32 % SIDE + right, number as i32 / SIDE + up];
@@ -126,7 +142,7 @@ impl Ground {
             p + q + r + s
         };
         let (surface, slope) = (between(|cell| cell.height), between(|cell| cell.slope));
-        let width = (f64::from(self.steps) * self.scale.horizontal) as f32;
+        let width = (f64::from(self.squares.steps) * self.lattice.horizontal) as f32;
         (height - surface).abs() <= allowed_distance(self.tolerance, BY_SLOPE, width * slope)
     }
 }

@@ -8,8 +8,8 @@ mod fill;
 mod find;
 mod ground;
 mod lowest;
+mod metric_lattice;
 mod morphology;
-mod scale;
 mod sizes;
 mod slope;
 #[cfg(test)]
@@ -18,5 +18,5 @@ mod tests;
 pub use density::{CoveredArea, PointCollector};
 pub use ground::{BYTES_PER_CELL, Ground, GroundColumns};
 pub use lowest::LowestHeights;
-pub use scale::Scale;
+pub use metric_lattice::MetricLattice;
 pub use sizes::GroundSizes;

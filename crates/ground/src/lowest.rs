@@ -2,8 +2,8 @@
 
 use crate::cells::{Cells, split};
 use crate::density::{CoveredArea, PointCollector};
+use crate::metric_lattice::{MetricLattice, SquareCells};
 use crate::morphology::EMPTY;
-use crate::scale::Scale;
 
 /// The least width of a cell in metres.
 const LEAST_WIDTH: f64 = 1.0;
@@ -15,17 +15,16 @@ const NONE: i32 = i32::MAX;
 /// The lowest points of a cloud, cell by cell.
 #[derive(Clone, Debug)]
 pub struct LowestHeights {
-    pub(crate) scale: Scale,
-    /// The width of a cell in lattice steps.
-    pub(crate) steps: i32,
+    pub(crate) lattice: MetricLattice,
+    pub(crate) squares: SquareCells,
     cells: Cells<i32>,
 }
 
 impl LowestHeights {
     /// Returns cells without points for the cloud that covers this area.
     pub fn new(area: &CoveredArea) -> LowestHeights {
-        let steps = area.scale.steps_of(LEAST_WIDTH.max(SPACINGS * area.spacing()));
-        LowestHeights { scale: area.scale, steps, cells: Cells::new(NONE) }
+        let steps = area.lattice.steps_of(LEAST_WIDTH.max(SPACINGS * area.spacing()));
+        LowestHeights { lattice: area.lattice, squares: area.lattice.cells(steps), cells: Cells::new(NONE) }
     }
 
     /// Returns the number of cells that take memory.
@@ -35,20 +34,20 @@ impl LowestHeights {
 
     /// Returns the width of a cell in metres.
     pub(crate) fn width(&self) -> f64 {
-        f64::from(self.steps) * self.scale.horizontal
+        f64::from(self.squares.steps) * self.lattice.horizontal
     }
 
     /// Returns the heights in metres above the lowest of all, and that one.
     pub(crate) fn metres(&self) -> (Cells<f32>, i32) {
         let base = self.cells.values().flatten().copied().min().unwrap_or(0);
-        let metres = |z: &i32| if *z == NONE { EMPTY } else { metres_above(base, *z, self.scale) };
+        let metres = |z: &i32| if *z == NONE { EMPTY } else { metres_above(base, *z, self.lattice) };
         (self.cells.map(EMPTY, 0, |window| window.values.iter().map(metres).collect()), base)
     }
 }
 
 /// Returns the height of a point in metres above another one.
-pub(crate) fn metres_above(base: i32, z: i32, scale: Scale) -> f32 {
-    ((i64::from(z) - i64::from(base)) as f64 * scale.vertical) as f32
+pub(crate) fn metres_above(base: i32, z: i32, lattice: MetricLattice) -> f32 {
+    ((i64::from(z) - i64::from(base)) as f64 * lattice.vertical) as f32
 }
 
 impl PointCollector for LowestHeights {
@@ -58,7 +57,7 @@ impl PointCollector for LowestHeights {
 
     fn add(&mut self, points: impl Iterator<Item = [i32; 3]>) {
         for [x, y, z] in points {
-            let (block, number) = split([x.div_euclid(self.steps), y.div_euclid(self.steps)]);
+            let (block, number) = split(self.squares.of([x, y]));
             let lowest = &mut self.cells.block_mut(block)[number];
             *lowest = z.min(*lowest);
         }

@@ -1,9 +1,9 @@
 //! Made-up scenes whose ground is known.
 
-use crate::{CoveredArea, Ground, GroundSizes, LowestHeights, PointCollector, Scale};
+use crate::{CoveredArea, Ground, GroundSizes, LowestHeights, MetricLattice, PointCollector};
 
 /// Centimetres.
-const SCALE: Scale = Scale { horizontal: 0.01, vertical: 0.01 };
+const SCALE: MetricLattice = MetricLattice { horizontal: 0.01, vertical: 0.01, offset: [0; 2] };
 
 /// A generator of numbers that look random (Steele, Lea and Flood 2014, "Fast splittable pseudorandom number generators").
 struct Random(u64);
@@ -86,8 +86,12 @@ fn scene(seed: u64) -> Vec<Labelled> {
 }
 
 fn found(points: &[Labelled]) -> Ground {
+    found_on(SCALE, points)
+}
+
+fn found_on(lattice: MetricLattice, points: &[Labelled]) -> Ground {
     let all = || points.iter().map(|(point, _)| *point);
-    let mut area = CoveredArea::new(SCALE);
+    let mut area = CoveredArea::new(lattice);
     area.add(all());
     let mut lowest = LowestHeights::new(&area);
     lowest.add(all());
@@ -135,6 +139,21 @@ fn the_ground_depends_on_the_points_alone() {
         assert_eq!((&columns.numbers, &columns.places), (&expected.numbers, &expected.places));
         let bits = |heights: &[f32]| heights.iter().map(|height| height.to_bits()).collect::<Vec<u32>>();
         assert!(bits(&columns.heights) == bits(&expected.heights));
+    }
+}
+
+/// Lattices that begin elsewhere give the same ground.
+#[test]
+fn the_ground_is_the_same_on_every_lattice() {
+    for (seed, offset) in
+        [(500, [1_234_567, -89_123, 4_321]), (501, [-7, 400_000_001, -60_000]), (502, [1 << 27, 33, 1])]
+    {
+        let points = scene(seed);
+        let moved = |[x, y, z]: [i32; 3]| [x - offset[0], y - offset[1], z - offset[2]];
+        let there: Vec<Labelled> = points.iter().map(|(point, is_ground)| (moved(*point), *is_ground)).collect();
+        let other = MetricLattice { offset: [offset[0].into(), offset[1].into()], ..SCALE };
+        let (here, there) = (found(&points), found_on(other, &there));
+        assert!(points.iter().all(|(point, _)| here.has(*point) == there.has(moved(*point))), "{seed}");
     }
 }
 

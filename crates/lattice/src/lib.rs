@@ -54,6 +54,17 @@ impl Lattice {
         if axis == 2 { self.resolution_z } else { self.resolution }
     }
 
+    /// Returns the steps in x and y from zero of the source coordinates to zero of the lattice, rounded down: 0 where they are too many for 64 bits.
+    pub fn steps_from_zero(&self) -> [i64; 2] {
+        let steps = |axis: usize| {
+            let (offset, step) = (self.offset[axis], self.resolution);
+            let rest = offset.checked_rem(step)?;
+            let rounded = offset.checked_sub(rest)?.checked_div(step)?.to_i64()?;
+            Some(if rest < Decimal::ZERO { rounded - 1 } else { rounded })
+        };
+        [0, 1].map(|axis| steps(axis).unwrap_or_default())
+    }
+
     /// Returns the world coordinate of lattice integer `i` on `axis`, correctly rounded. It is a number on every lattice that
     /// [`Lattice::new`] returns, and NaN where another lattice would need too many digits.
     pub fn world(&self, axis: usize, i: i32) -> f64 {
@@ -331,6 +342,17 @@ mod tests {
         assert_eq!(shortest_decimal(-123456.789).unwrap().to_string(), "-123456.789");
         assert_eq!(shortest_decimal(f64::NAN), None);
         assert_eq!(shortest_decimal(1e300), None);
+    }
+
+    #[test]
+    fn lattices_of_the_same_points_are_whole_steps_apart() {
+        let steps = |x: &str, y: &str, step: &str| {
+            let offset = [decimal(x), decimal(y), Decimal::ZERO];
+            Lattice::new(offset, decimal(step), Decimal::ONE).unwrap().steps_from_zero()
+        };
+        assert_eq!(steps("500000", "-0.3", "0.01"), [50_000_000, -30]);
+        assert_eq!(steps("500000.003", "-0.303", "0.01"), [50_000_000, -31]);
+        assert_eq!(steps("1.2", "-1.0", "0.3"), [4, -4]);
     }
 
     #[test]

@@ -53,7 +53,7 @@ pub(crate) fn divide<E: Send>(
     points: u64,
     sizes: RegionSizes,
 ) -> Result<Division<'_, E>, E> {
-    let cells = LatticeCells::new(bounds, points, sizes.points);
+    let cells = LatticeCells::new(bounds, points, sizes.points, source.offset());
     let share = |block| {
         let points = source.load(block)?.points;
         let mut shares = BTreeMap::<[i32; 2], Share>::new();
@@ -97,6 +97,10 @@ impl<E: Send> PointSource for Region<'_, E> {
 
     fn blocks(&self) -> usize {
         self.blocks.len()
+    }
+
+    fn offset(&self) -> [i64; 2] {
+        self.source.offset()
     }
 
     fn load(&self, block: usize) -> Result<BlockPoints, E> {

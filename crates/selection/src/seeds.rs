@@ -8,23 +8,30 @@ use std::collections::HashMap;
 /// take longer.
 const POINTS_PER_CELL: u64 = 16_000;
 
-/// Square cells of the lattice whose sides are a power of two steps, and which have so many points on average.
+/// Square cells whose sides are a power of two steps, and which have so many points on average. They begin at zero of the source coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct LatticeCells {
     shift: u32,
+    /// The steps in x and y from there to zero of the lattice, less a multiple of the widest cells.
+    offset: [i32; 2],
 }
 
+/// The cells are no wider than two to the power of this many steps, the widest extent of a lattice.
+const MOST_SHIFT: u32 = 30;
+
 impl LatticeCells {
-    /// Returns the smallest cells that hold `wanted` of the `points` in `bounds` on average.
-    pub(crate) fn new(bounds: Bounds<2>, points: u64, wanted: u64) -> LatticeCells {
+    /// Returns the smallest cells that hold `wanted` of the `points` in `bounds` on average, on a lattice with this `offset`: see
+    /// [`crate::PointSource::offset`].
+    pub(crate) fn new(bounds: Bounds<2>, points: u64, wanted: u64, offset: [i64; 2]) -> LatticeCells {
         let area = (bounds.extent(0) + 1) as u128 * (bounds.extent(1) + 1) as u128;
         let is_enough = |shift: &u32| u128::from(points) << (2 * shift) >= u128::from(wanted) * area;
-        LatticeCells { shift: (0..30).find(is_enough).unwrap_or(30) }
+        let shift = (0..MOST_SHIFT).find(is_enough).unwrap_or(MOST_SHIFT);
+        LatticeCells { shift, offset: offset.map(|offset| offset.rem_euclid(1 << MOST_SHIFT) as i32) }
     }
 
     /// Returns the column and the row of the cell that `x` and `y` are in.
     pub(crate) fn of(self, x: i32, y: i32) -> [i32; 2] {
-        [x >> self.shift, y >> self.shift]
+        [(x + self.offset[0]) >> self.shift, (y + self.offset[1]) >> self.shift]
     }
 
     /// Returns the side of a cell.
@@ -34,8 +41,8 @@ impl LatticeCells {
 
     /// Returns the square of the distance of a point from the middle of its cell.
     fn distance_from_middle(self, point: [i32; 3]) -> i64 {
-        let along = |value: i32| i64::from(value) - ((i64::from(value >> self.shift) << self.shift) + self.side() / 2);
-        along(point[0]).pow(2) + along(point[1]).pow(2)
+        let along = |axis: usize| i64::from(point[axis] + self.offset[axis]).rem_euclid(self.side()) - self.side() / 2;
+        along(0).pow(2) + along(1).pow(2)
     }
 }
 
@@ -49,9 +56,9 @@ pub(crate) struct Seeds {
 }
 
 impl Seeds {
-    /// Returns no seeds for `points` points in `bounds`.
-    pub(crate) fn none(bounds: Bounds<2>, points: u64) -> Seeds {
-        let cells = LatticeCells::new(bounds, points, POINTS_PER_CELL);
+    /// Returns no seeds for `points` points in `bounds`, on a lattice with this `offset`.
+    pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2]) -> Seeds {
+        let cells = LatticeCells::new(bounds, points, POINTS_PER_CELL, offset);
         Seeds { cells, hull: Vec::new(), by_cell: HashMap::new(), fixed: Vec::new() }
     }
 

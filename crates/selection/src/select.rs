@@ -49,14 +49,14 @@ pub(crate) fn select_by_regions<E: Send>(
     } else {
         let seed = |block| {
             let BlockPoints { points: of_block, fixed } = source.load(block)?;
-            let mut seeds = Seeds::none(bounds, points);
+            let mut seeds = Seeds::none(bounds, points, source.offset());
             seeds.add(&of_block, &fixed);
             Ok((seeds, BlockState::of(&of_block)))
         };
         let found: Vec<(Seeds, BlockState)> =
             (0..source.blocks()).into_par_iter().with_max_len(1).map(seed).collect::<Result<_, E>>()?;
         let (seeds, blocks): (Vec<Seeds>, Vec<BlockState>) = found.into_iter().unzip();
-        let seeds = seeds.into_iter().fold(Seeds::none(bounds, points), Seeds::join);
+        let seeds = seeds.into_iter().fold(Seeds::none(bounds, points, source.offset()), Seeds::join);
         let outline = seeds.hull().to_vec();
         rounds.begin(blocks, outline, seeds.into_points(), 0);
     }

@@ -27,10 +27,10 @@ impl SelectedSites {
     pub(crate) fn none(bounds: Bounds<2>, points: u64) -> SelectedSites {
         let most = bounds.extent(0).max(bounds.extent(1)) / MOST_LINES + 1;
         let mut wanted = POINTS_PER_CELL;
-        let mut cells = LatticeCells::new(bounds, points, wanted);
+        let mut cells = LatticeCells::new(bounds, points, wanted, [0; 2]);
         while cells.side() < most {
             wanted = wanted.saturating_mul(4);
-            cells = LatticeCells::new(bounds, points, wanted);
+            cells = LatticeCells::new(bounds, points, wanted, [0; 2]);
         }
         let (first, last) = (cells.of(bounds.min[0], bounds.min[1]), cells.of(bounds.max[0], bounds.max[1]));
         let [columns, rows] = [0, 1].map(|axis| (last[axis] - first[axis] + 1) as usize);

@@ -27,6 +27,10 @@ pub trait PointSource: Sync {
     /// Returns the number of blocks.
     fn blocks(&self) -> usize;
 
+    /// Returns the steps in x and y from zero of the source coordinates to zero of the lattice. What is selected goes by them, and not by where the
+    /// lattice begins.
+    fn offset(&self) -> [i64; 2];
+
     /// Returns the points of a block. The boxes of blocks do not touch.
     ///
     /// # Errors

@@ -12,6 +12,7 @@ use std::collections::BTreeSet;
 struct Cloud {
     blocks: Vec<BlockPoints>,
     keeps_blocks: bool,
+    offset: [i64; 2],
 }
 
 impl Cloud {
@@ -20,7 +21,7 @@ impl Cloud {
         let cell = |p: &[i32; 3]| [p[0].div_euclid(side), p[1].div_euclid(side)];
         points.iter().for_each(|p| blocks.entry(cell(p)).or_default().points.push(*p));
         fixed.iter().for_each(|p| blocks.entry(cell(p)).or_default().fixed.push(*p));
-        Cloud { blocks: blocks.into_values().collect(), keeps_blocks }
+        Cloud { blocks: blocks.into_values().collect(), keeps_blocks, offset: [0; 2] }
     }
 }
 
@@ -29,6 +30,10 @@ impl PointSource for Cloud {
 
     fn blocks(&self) -> usize {
         self.blocks.len()
+    }
+
+    fn offset(&self) -> [i64; 2] {
+        self.offset
     }
 
     fn load(&self, block: usize) -> Result<BlockPoints, delaunay::Error> {
@@ -174,7 +179,7 @@ proptest! {
         let chosen: BTreeSet<_> = found.iter().copied().collect();
         prop_assert_eq!(worst_points(&points, &chosen, bound), Vec::new());
         // Round by round the plain way.
-        let mut seeds = crate::seeds::Seeds::none(bounds_of(&points), points.len() as u64);
+        let mut seeds = crate::seeds::Seeds::none(bounds_of(&points), points.len() as u64, [0; 2]);
         seeds.add(&points, &[]);
         prop_assert_eq!(found, plain_rounds(&points, seeds.into_points(), bound));
     }
@@ -248,26 +253,34 @@ fn rounds_select_about_as_many_points_as_greedy_insertion() {
     }
 }
 
-/// With small regions: every point is within the bound, and nothing depends on the blocks.
+/// With small regions: every point is within the bound, and nothing depends on the blocks, or on where the lattice begins.
 #[test]
-fn regions_do_not_depend_on_blocks() {
+fn regions_depend_on_the_points_alone() {
     let sizes = crate::regions::RegionSizes { undivided: 1_600, points: 100 };
     let mut clouds = vec![hills(3_000)];
     // A dense cluster, whose regions are divided again, and a line far away.
     clouds.push((0..4_000).map(|i| [i % 63, i / 63, (i % 63) * (i / 63) % 29]).collect());
     clouds[1].extend((0..50).map(|i| [40_000 + 100 * i, 90_000, i % 7]));
     for points in clouds {
-        let (bounds, bound) = (bounds_of(&points), ErrorBound::new(12, 1));
-        let run = |side: i32, keeps: bool| {
-            let cloud = Cloud::new(&points, &points[700..702], side, keeps);
+        let bound = ErrorBound::new(12, 1);
+        let run = |side: i32, keeps: bool, offset: [i32; 2]| {
+            let moved = |[x, y, z]: [i32; 3]| [x - offset[0], y - offset[1], z];
+            let back = |[x, y, z]: [i32; 3]| [x + offset[0], y + offset[1], z];
+            let points: Vec<[i32; 3]> = points.iter().copied().map(moved).collect();
+            let mut cloud = Cloud::new(&points, &points[700..702], side, keeps);
+            cloud.offset = offset.map(i64::from);
+            let bounds = bounds_of(&points);
             let found = crate::select::select_by_regions(&cloud, bounds, points.len() as u64, bound, sizes).unwrap();
-            let mut all: Vec<_> = found.sites.within(bounds).collect();
+            let mut all: Vec<_> = found.sites.within(bounds).map(back).collect();
             all.sort_unstable();
-            (all, found.figures)
+            let worst = found.figures.worst.map(back);
+            (all, Figures { worst, ..found.figures })
         };
-        let (found, figures) = run(1_000_000, true);
-        for (side, keeps) in [(17, true), (900, false), (3_000, true)] {
-            assert_eq!(run(side, keeps), (found.clone(), figures), "blocks of {side}");
+        let (found, figures) = run(1_000_000, true, [0; 2]);
+        let others =
+            [(17, true, [0; 2]), (900, false, [0; 2]), (3_000, true, [12_345, -999]), (700, false, [-1_000_003, 1])];
+        for (side, keeps, offset) in others {
+            assert_eq!(run(side, keeps, offset), (found.clone(), figures), "blocks of {side}, {offset:?}");
         }
         let chosen: BTreeSet<_> = found.iter().copied().collect();
         assert_eq!(worst_points(&points, &chosen, bound), Vec::new());

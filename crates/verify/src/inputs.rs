@@ -15,7 +15,7 @@ use crate::report::ReportedFacts;
 use crate::surface::{Bound, Surface, SurfaceProof};
 use crate::watcher::Watcher;
 use delaunay::geometry::Site;
-use ground::{CoveredArea, Ground, LowestHeights, PointCollector, Scale};
+use ground::{CoveredArea, Ground, LowestHeights, MetricLattice, PointCollector};
 use lattice::{AxisMap, Lattice, shortest_decimal};
 use points::options::{Duplicates, InputOptions};
 use points::samples::{FileSamples, fingerprint_of};
@@ -100,7 +100,7 @@ pub(super) struct InputProof {
 pub(super) struct Inputs<'a> {
     facts: &'a ReportedFacts,
     lattice: Lattice,
-    scale: Scale,
+    metric: MetricLattice,
     sources: Vec<Source>,
     files: &'a [PathBuf],
     /// The area that the job kept points in; `None` for everywhere.
@@ -152,12 +152,13 @@ impl<'a> Inputs<'a> {
             }
         }
         let lattice = lattice_of(facts, extras)?;
-        let scale = Scale {
+        let metric = MetricLattice {
             horizontal: extras.resolution * extras.metres_per_unit,
             vertical: extras.resolution_z * extras.metres_per_unit_z,
+            offset: lattice.steps_from_zero(),
         };
         let clip = clip_area(facts, &lattice)?;
-        Ok(Inputs { facts, lattice, scale, sources, files, clip, watcher })
+        Ok(Inputs { facts, lattice, metric, sources, files, clip, watcher })
     }
 
     /// Compares the vertices in `places` with the points of the inputs, and with the ends of the edges along breaklines. Points that are no
@@ -230,7 +231,7 @@ impl<'a> Inputs<'a> {
     /// Finds the ground anew, as the job did.
     fn find_ground(&self) -> Result<Ground> {
         self.begin("find area");
-        let area = self.collect(CoveredArea::new(self.scale))?;
+        let area = self.collect(CoveredArea::new(self.metric))?;
         self.begin("find ground");
         let lowest = self.collect(LowestHeights::new(&area))?;
         let sizes = self.facts.input.as_ref().map(|input| input.bare_earth).unwrap_or_default();

@@ -61,12 +61,17 @@ impl HullRule {
         HullRule::of_points(records, area, spacings)
     }
 
+    /// Returns a number that differs for rules by other lengths.
+    pub(crate) fn key(&self) -> u64 {
+        self.limit
+    }
+
     /// Returns the rule where so many points share an `area` in square lattice steps, and an edge is long from so many of their spacings on. No
     /// two points that stay are nearer than a step.
     fn of_points(points: u64, area: u64, spacings: u64) -> HullRule {
         let points = points.max(1);
         let limit = u128::from(spacings * spacings) * u128::from(area.max(points)) / u128::from(points);
-        HullRule { limit: u64::try_from(limit).unwrap_or(u64::MAX), on_ground: None }
+        HullRule { limit: rounded(u64::try_from(limit).unwrap_or(u64::MAX)), on_ground: None }
     }
 
     /// Returns the longest edge that no triangle flows over, in lattice steps.
@@ -112,6 +117,12 @@ impl HullRule {
         is_enough(u128::from(count * SHARE_OF_AREA), area)
             && is_enough(u128::from(count * SHARE_OF_SIDE).pow(2), longest)
     }
+}
+
+/// Returns a number rounded down to three bits, so that a few points more or less leave the rule of a job as it is.
+fn rounded(number: u64) -> u64 {
+    let below = u64::BITS.saturating_sub(number.leading_zeros() + 3);
+    number >> below << below
 }
 
 /// Returns the dot product of the vectors from `o` to `a` and to `b`, which is below 2^62.

@@ -19,7 +19,7 @@ use crate::{Error, Result};
 use delaunay::geometry::Site;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay_gpu::triangulator::Triangulator;
-use ground::{BYTES_PER_CELL, CoveredArea, Ground, LowestHeights, PointCollector, Scale};
+use ground::{BYTES_PER_CELL, CoveredArea, Ground, LowestHeights, MetricLattice, PointCollector};
 use points::Point;
 use rayon::prelude::*;
 use rust_decimal::Decimal;
@@ -98,6 +98,12 @@ pub(crate) fn too_many_vertices(options: &JobOptions, selected: u64) -> Option<S
     })
 }
 
+/// Returns the lattice of a job in metres.
+pub(crate) fn metric_lattice(plan: &Plan) -> MetricLattice {
+    let [horizontal, vertical] = plan.frame.resolution_metres();
+    MetricLattice { horizontal, vertical, offset: plan.lattice.steps_from_zero() }
+}
+
 /// Returns what is wrong if the memory has no room for the heights of so many cells.
 fn too_many_cells(options: &JobOptions, cells: u64) -> Option<String> {
     let has_room = cells.saturating_mul(BYTES_PER_CELL) <= working_memory(options);
@@ -155,8 +161,7 @@ impl<'a> PointsInBlocks<'a> {
     /// # Errors
     /// [`sys::Error::Io`] on point files; [`sys::Error::Config`] if the memory does not hold the heights of all cells.
     pub(crate) fn on_found_ground(mut self, advance: impl Fn(u64) + Sync) -> Result<PointsInBlocks<'a>> {
-        let [horizontal, vertical] = self.plan.frame.resolution_metres();
-        let area = self.collect(&CoveredArea::new(Scale { horizontal, vertical }), &|_| None)?;
+        let area = self.collect(&CoveredArea::new(metric_lattice(self.plan)), &|_| None)?;
         let refusal = |lowest: &LowestHeights| too_many_cells(&self.plan.options, lowest.cells());
         let lowest = self.collect(&LowestHeights::new(&area), &refusal)?;
         let points: u64 = self.parts.iter().map(|part| part.partition.kept).sum();
@@ -267,6 +272,10 @@ impl PointSource for PointsInBlocks<'_> {
 
     fn blocks(&self) -> usize {
         self.blocks.len()
+    }
+
+    fn offset(&self) -> [i64; 2] {
+        self.plan.lattice.steps_from_zero()
     }
 
     fn load(&self, block: usize) -> Result<BlockPoints> {

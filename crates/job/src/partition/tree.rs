@@ -180,7 +180,7 @@ mod tests {
         };
         let tree = Tree { nodes: (0..12).map(inner).collect(), ..Tree::default() };
         let merges: Vec<usize> = (0..12).filter(|&node| tree.is_merge(NodeIndex::new(node))).collect();
-        assert_eq!((LAYOUT, merges), (34, vec![0, 2, 5, 8, 11]));
+        assert_eq!((LAYOUT, merges), (35, vec![0, 2, 5, 8, 11]));
     }
 
     proptest! {

@@ -176,12 +176,12 @@ impl Plan {
         }
         let input = |input: &PlannedInput| CutInput { claimed: input.claimed, records: input.decoded_records() };
         let inputs = self.inputs.iter().map(input).collect();
-        Cow::Owned(PlanCut { extent: self.extent, records: self.records, area: self.claimed_area, inputs })
+        Cow::Owned(PlanCut { extent: self.extent, records: self.records, inputs })
     }
 
     /// Returns the number of records, and the area that they share, which decide what is far apart.
     pub(crate) fn density(&self) -> (u64, u64) {
-        self.cut.as_ref().map_or((self.records, self.claimed_area), |cut| (cut.records, cut.area))
+        (self.records, self.claimed_area)
     }
 
     /// Returns the number of records that are decoded.

@@ -3,15 +3,13 @@
 use delaunay::geometry::Bounds;
 use serde::{Deserialize, Serialize};
 
-/// What decides where the parts of a job are cut, and how its tiles look beside each other, besides the points in them.
+/// What decides where the parts of a job are cut, besides the points in them.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct PlanCut {
     /// The box of the inputs on the lattice.
     pub(crate) extent: Bounds<2>,
     /// The number of records in all inputs.
     pub(crate) records: u64,
-    /// The area of the box around all records in square lattice steps.
-    pub(crate) area: u64,
     /// The inputs.
     pub(crate) inputs: Vec<CutInput>,
 }

@@ -4,7 +4,7 @@
 //! as often. So each sample is looked at twice, the second time with a quarter of its points, and what changes then is taken to change
 //! in the same way up to the density of all points.
 
-use crate::mesh::selection::error_bound;
+use crate::mesh::selection::{error_bound, metric_lattice};
 use crate::plan::job_plan::Plan;
 use crate::preflight::kept_points::KeptPoints;
 use crate::preflight::sampled_points::sampled_points;
@@ -13,7 +13,7 @@ use crate::progress::number_text::{grouped, mebibytes, rough};
 use crate::publish::contours::check::TerrainLevels;
 use delaunay::geometry::Site;
 use delaunay::triangulation::canonical;
-use ground::{CoveredArea, Ground, LowestHeights, PointCollector, Scale};
+use ground::{CoveredArea, Ground, LowestHeights, PointCollector};
 use points::surface::{MeshOf, Surface};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -216,8 +216,7 @@ fn config_error(error: crate::Error) -> Error {
 
 /// Returns those of some points that are on the ground, as far as these points alone tell.
 fn on_ground(plan: &Plan, mut points: Vec<[i32; 3]>) -> Result<Vec<[i32; 3]>> {
-    let [horizontal, vertical] = plan.frame.resolution_metres();
-    let mut area = CoveredArea::new(Scale { horizontal, vertical });
+    let mut area = CoveredArea::new(metric_lattice(plan));
     area.add(points.iter().copied());
     let mut lowest = LowestHeights::new(&area);
     lowest.add(points.iter().copied());

@@ -54,6 +54,10 @@ impl PointSource for Sample<'_> {
         1
     }
 
+    fn offset(&self) -> [i64; 2] {
+        [0; 2]
+    }
+
     fn load(&self, _: usize) -> Result<BlockPoints> {
         Ok(BlockPoints { points: self.0.to_vec(), fixed: Vec::new() })
     }

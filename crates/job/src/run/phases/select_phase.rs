@@ -5,6 +5,7 @@ use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::durable::directory::JobDirectory;
 use crate::durable::journal::records_of;
 use crate::index::PartIndex;
+use crate::mesh::hull_rule::HullRule;
 use crate::mesh::selection::{PartInBlocks, PointsInBlocks, WrittenPoints, error_bound, points_per_block};
 use crate::partition::part_points::{PointsOfPart, file_of_selected};
 use crate::plan::budget::working_memory;
@@ -115,12 +116,14 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     Ok(())
 }
 
-/// Returns the key of the selection, with `--update`: the digest of the points of all parts. Else 0.
+/// Returns the key of the selection, with `--update`: the digest of the points of all parts, and which triangles are asked about. Else 0.
 fn key_of_all_points(job: &Job) -> Result<u64> {
     if !job.plan.options.updates {
         return Ok(0);
     }
-    job.parts.all().try_fold(0u64, |all, part| Ok(all.wrapping_add(listed_points_of(job, part)?.digest())))
+    job.parts
+        .all()
+        .try_fold(key_of_lengths(job), |all, part| Ok(all.wrapping_add(listed_points_of(job, part)?.digest())))
 }
 
 /// Tells the plan what the selection has found, if it is done. Later phases of jobs that have one fail without.
@@ -152,7 +155,13 @@ pub(crate) fn found_ground(job: &Job) -> sys::Result<Ground> {
     Ground::of_columns(ground).ok_or_else(|| sys::Error::Broken("the ground has no heights".into()))
 }
 
+/// Returns a hash of the rule by which triangles along the hull may be slivers.
+fn key_of_lengths(job: &Job) -> u64 {
+    xxh3_64(&HullRule::of_lengths(job.plan).key().to_le_bytes())
+}
+
 /// Returns the key of the mesh of a part, with `--update`: the digest of its vertices, and of the long triangles on ground among them. Else 0.
+/// Which triangles flow is found with the mesh.
 ///
 /// # Errors
 /// As [`vertices_of`].
@@ -161,9 +170,9 @@ pub(crate) fn key_of_vertices(job: &Job, part: PartIndex) -> Result<u64> {
         return Ok(0);
     }
     if !selects(job.plan) {
-        return Ok(listed_points_of(job, part)?.digest());
+        return Ok(listed_points_of(job, part)?.digest().wrapping_add(key_of_lengths(job)));
     }
-    let vertices = selected_part(job, part)?.digest;
+    let vertices = selected_part(job, part)?.digest.wrapping_add(key_of_lengths(job));
     let is_of_part = |triangle: &&[Site; 3]| {
         triangle.iter().any(|&site| job.parts.part_of(job.parts.grid.bucket(site) as usize) == part)
     };
