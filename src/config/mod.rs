@@ -25,6 +25,7 @@ use glob::Pattern;
 use job::options::JobOptions;
 use points::lines::options::LineOptions;
 use points::options::is_by_url;
+use points::public_name;
 use std::path::Path;
 use sys::path_text::encoded;
 use sys::{Error, Result, Warnings};
@@ -130,9 +131,12 @@ fn resolve_paths(options: &mut JobOptions, base: &Path) -> std::result::Result<(
     }
     if let Some(photo) = options.output.color.photo_mut() {
         let name = photo.to_string_lossy().into_owned();
-        refuse_url("[output] color", &name)?;
-        let Anchored { base, path } = anchor("[output] color", &name, base)?;
-        *photo = base.join(path);
+        *photo = if is_by_url(&name) {
+            public_name(&name).map_err(|what| format!("[output] color: {what}"))?.into()
+        } else {
+            let Anchored { base, path } = anchor("[output] color", &name, base)?;
+            base.join(path)
+        };
     }
     if let Some(clip) = options.input.clip.as_mut() {
         refuse_url("[input] clip", clip)?;
@@ -159,7 +163,9 @@ fn refuse_url(option: &str, name: &str) -> std::result::Result<(), String> {
         // Its query may be a secret.
         true => {
             let place = name.split('?').next().unwrap_or_default();
-            Err(format!("{option}: {place}: only point clouds are read by URL; download this file and name the copy"))
+            Err(format!(
+                "{option}: {place}: only point clouds and orthophotos are read by URL; download this file and name the copy"
+            ))
         }
         false => Ok(()),
     }

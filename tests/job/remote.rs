@@ -212,7 +212,9 @@ fn what_no_server_can_hand_out_is_refused() {
     server.answer(|_, _| Answer::Right);
     let lines = Job::on(&[server.url("/a/cloud.las")])
         .with("[breaklines]", "files = [\"https://host/a.gpkg?token=1\"]\nkind = \"line\"");
-    lines.run().refused(2, &["[[breaklines]] files: https://host/a.gpkg: only point clouds are read by URL"]);
+    lines
+        .run()
+        .refused(2, &["[[breaklines]] files: https://host/a.gpkg: only point clouds and orthophotos are read by URL"]);
     gdt_batch(lines.folder(), &["info", &server.url("/none.laz")]).refused(2, &["there is no file"]);
 }
 

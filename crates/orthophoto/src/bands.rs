@@ -1,7 +1,7 @@
 //! What the bands of a picture mean.
 
-use std::io::{Read, Seek};
-use tiff::decoder::Decoder;
+use crate::errors::{Trouble, if_there};
+use crate::image::Image;
 use tiff::tags::Tag;
 
 const COMPRESSION_NONE: u16 = 1;
@@ -35,19 +35,18 @@ pub(crate) struct Bands {
 }
 
 impl Bands {
-    /// Returns the bands of an image, or a sentence that says why it cannot be read.
-    pub(crate) fn of<R: Read + Seek>(image: &mut Decoder<R>) -> Result<Bands, String> {
-        let mut number = |tag, default| match image.find_tag(tag) {
-            Ok(Some(value)) => value.into_u16().map_err(|e| e.to_string()),
-            Ok(None) => Ok(default),
-            Err(error) => Err(error.to_string()),
+    /// Returns the bands of an image, or what is wrong with it.
+    pub(crate) fn of(image: &mut Image) -> Result<Bands, Trouble> {
+        let mut number = |tag, default| match image.find_tag(tag)? {
+            Some(value) => value.into_u16().map_err(Trouble::from),
+            None => Ok(default),
         };
         let (count, photometric) =
             (number(Tag::SamplesPerPixel, 1)?, number(Tag::PhotometricInterpretation, BLACK_IS_ZERO)?);
         let (planar, compression) = (number(Tag::PlanarConfiguration, 1)?, number(Tag::Compression, COMPRESSION_NONE)?);
-        let mut numbers = |tag| image.get_tag_u16_vec(tag).unwrap_or_default();
+        let mut numbers = |tag| if_there(image.get_tag_u16_vec(tag));
         let (bits, formats, extra) =
-            (numbers(Tag::BitsPerSample), numbers(Tag::SampleFormat), numbers(Tag::ExtraSamples));
+            (numbers(Tag::BitsPerSample)?, numbers(Tag::SampleFormat)?, numbers(Tag::ExtraSamples)?);
         if bits.iter().any(|bits| *bits != 8) || bits.is_empty() || formats.iter().any(|format| *format != 1) {
             return Err("its bands are not of eight bits without sign: make them so, for example with `gdal_translate -ot Byte -scale`".into());
         }
@@ -61,13 +60,16 @@ impl Bands {
             return Err(format!(
                 "it is compressed in a way that is not read ({compression}): use another one, for example with `gdal_translate -co \
                  COMPRESS=DEFLATE`"
-            ));
+            )
+            .into());
         }
         let is_jpeg = compression == COMPRESSION_JPEG;
         let is_ycbcr = photometric == YCBCR;
         let is_known = [BLACK_IS_ZERO, RGB].contains(&photometric) || (is_ycbcr && is_jpeg);
         if !is_known {
-            return Err(format!("its colours are of a kind that is not read ({photometric}): grey, RGB and RGBA are"));
+            return Err(
+                format!("its colours are of a kind that is not read ({photometric}): grey, RGB and RGBA are").into()
+            );
         }
         if planar == PLANAR && count > 1 {
             return Err("its bands are in planes of their own: put them side by side, for example with `gdal_translate -co INTERLEAVE=PIXEL`".into());
@@ -76,8 +78,8 @@ impl Bands {
         let first_extra = count.saturating_sub(extra.len());
         let alpha = extra.iter().position(|kind| ALPHA.contains(kind)).map(|at| first_extra + at);
         let is_colored = first_extra >= 3 || (alpha.is_none() && count >= 3);
-        let nodata = image.get_tag_ascii_string(Tag::GdalNodata).ok();
-        let nodata = nodata.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok());
+        let nodata = if_there(image.get_tag_ascii_string(Tag::GdalNodata))?;
+        let nodata = nodata.trim_matches(['\0', ' ']).parse().ok();
         Ok(Bands { count, alpha, is_colored, nodata, is_jpeg, is_ycbcr })
     }
 

@@ -1,17 +1,15 @@
 //! The tiles or strips of a picture, read one by one. The last ones stay in memory.
 
 use crate::bands::Bands;
+use crate::errors::{Trouble, if_there};
+use crate::image::Image;
 use crate::jpeg;
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::BufReader;
+use std::io::SeekFrom;
 use std::sync::{Arc, Mutex, PoisonError};
 use sys::catch_panic::catch_panic;
-use sys::positional_io::read_exact_at;
-use tiff::decoder::{ChunkType, Decoder, DecodingResult, Limits};
+use tiff::decoder::{ChunkType, DecodingResult, Limits};
 use tiff::tags::Tag;
-
-pub(crate) type Image = Decoder<BufReader<File>>;
 
 /// A tile or strip.
 #[derive(Debug)]
@@ -64,7 +62,6 @@ pub(crate) struct Chunks {
     places: Vec<(u64, u64)>,
     /// What all JPEG chunks have in common.
     tables: Vec<u8>,
-    file: File,
     state: Mutex<State>,
 }
 
@@ -85,9 +82,9 @@ impl Chunks {
     /// Returns the chunks of an image. All that stay in memory have `most_bytes` bytes at most, or one has as many.
     ///
     /// # Errors
-    /// A sentence about what cannot be read.
-    pub(crate) fn new(mut image: Image, file: File, bands: Bands, most_bytes: u64) -> Result<Chunks, String> {
-        let (width, height) = image.dimensions().map_err(|e| e.to_string())?;
+    /// What is wrong with the picture.
+    pub(crate) fn new(mut image: Image, bands: Bands, most_bytes: u64) -> Result<Chunks, Trouble> {
+        let (width, height) = image.dimensions()?;
         let (columns, rows) = image.chunk_dimensions();
         let grid = ChunkGrid { size: [width, height], chunk: [columns, rows.min(height)] };
         if grid.size.contains(&0) || grid.chunk.contains(&0) {
@@ -100,7 +97,8 @@ impl Chunks {
                  raise [limits] memory",
                 bytes >> 20,
                 most_bytes >> 20
-            ));
+            )
+            .into());
         }
         let limit = usize::try_from(most_bytes).unwrap_or(usize::MAX);
         let mut limits = Limits::default();
@@ -112,29 +110,31 @@ impl Chunks {
             ChunkType::Tile => [Tag::TileOffsets, Tag::TileByteCounts],
             ChunkType::Strip => [Tag::StripOffsets, Tag::StripByteCounts],
         };
-        let mut numbers = |tag| image.get_tag_u64_vec(tag).map_err(|e| e.to_string());
+        let mut numbers = |tag| image.get_tag_u64_vec(tag);
         let places: Vec<_> = numbers(offsets)?.into_iter().zip(numbers(counts)?).collect();
         let last = grid.place([width - 1, height - 1]).0;
         if places.len() <= last as usize {
-            return Err(format!("it has {} tiles or strips, and its size needs {}", places.len(), u64::from(last) + 1));
+            return Err(
+                format!("it has {} tiles or strips, and its size needs {}", places.len(), u64::from(last) + 1).into()
+            );
         }
-        let tables = if bands.is_jpeg { image.get_tag_u8_vec(Tag::JPEGTables).unwrap_or_default() } else { Vec::new() };
+        let tables = if bands.is_jpeg { if_there(image.get_tag_u8_vec(Tag::JPEGTables))? } else { Vec::new() };
         let state = Mutex::new(State { image, recent: VecDeque::new(), bytes: 0 });
-        Ok(Chunks { grid, bands, most_bytes, kind, places, tables, file, state })
+        Ok(Chunks { grid, bands, most_bytes, kind, places, tables, state })
     }
 
     /// Returns a chunk.
     ///
     /// # Errors
-    /// A sentence about what cannot be read.
-    pub(crate) fn get(&self, number: u32) -> Result<Arc<Chunk>, String> {
+    /// What is wrong with the picture.
+    pub(crate) fn get(&self, number: u32) -> Result<Arc<Chunk>, Trouble> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(at) = state.recent.iter().position(|(known, _)| *known == number) {
             let found = state.recent.remove(at);
             return found.map(|found| state.keep(found)).ok_or_else(|| "it is gone".into());
         }
-        let read = catch_panic(|| self.read(&mut state.image, number)).map_err(|e| e.to_string()).and_then(|read| read);
-        let chunk = Arc::new(read.map_err(|what| format!("tile or strip {number} cannot be read: {what}"))?);
+        let read = catch_panic(|| self.read(&mut state.image, number)).unwrap_or_else(|e| Err(e.to_string().into()));
+        let chunk = Arc::new(read.map_err(|what| what.with(format!("tile or strip {number} cannot be read")))?);
         state.bytes += chunk.bytes.len() as u64;
         while state.bytes > self.most_bytes
             && let Some((_, oldest)) = state.recent.pop_front()
@@ -144,7 +144,7 @@ impl Chunks {
         Ok(state.keep((number, chunk)))
     }
 
-    fn read(&self, image: &mut Image, number: u32) -> Result<Chunk, String> {
+    fn read(&self, image: &mut Image, number: u32) -> Result<Chunk, Trouble> {
         let place = self.places.get(number as usize).copied();
         let (offset, count) = place.ok_or("it is not there")?;
         if count == 0 {
@@ -152,16 +152,18 @@ impl Chunks {
         }
         let (width, height) = image.chunk_data_dimensions(number);
         if !self.bands.is_jpeg {
-            return match image.read_chunk(number).map_err(|e| e.to_string())? {
+            return match image.read_chunk(number)? {
                 DecodingResult::U8(bytes) => Ok(Chunk { width: width as usize, bytes }),
                 _ => Err("it has other numbers than the tags say".into()),
             };
         }
         if count > self.most_bytes {
-            return Err(format!("it has {count} bytes, more than fit"));
+            return Err(format!("it has {count} bytes, more than fit").into());
         }
         let mut piece = vec![0; usize::try_from(count).map_err(|e| e.to_string())?];
-        read_exact_at(&self.file, &mut piece, offset).map_err(|e| e.to_string())?;
+        let bytes = image.inner();
+        bytes.seek(SeekFrom::Start(offset))?;
+        bytes.read_exact(&mut piece)?;
         // Tiles at the border are whole, strips are not.
         let [columns, rows] = match self.kind {
             ChunkType::Tile => self.grid.chunk,

@@ -1,11 +1,11 @@
 //! Where the pixels of a picture are.
 
+use crate::errors::{Trouble, if_there};
+use crate::image::Image;
 use crs::from_records::from_records;
 use crs::geokeys::GeoKeys;
 use crs::{Crs, CrsTransform, DatumNote, DatumRule, Sameness};
-use std::io::{Read, Seek};
 use sys::Warnings;
-use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 
 /// The GeoKey that says what a pixel is, and its value for a point; else it is an area.
@@ -22,12 +22,12 @@ pub(crate) struct PixelGrid {
 }
 
 impl PixelGrid {
-    /// Returns the grid of an image, or a sentence that says why there is none.
-    pub(crate) fn of<R: Read + Seek>(image: &mut Decoder<R>) -> Result<PixelGrid, String> {
-        let mut numbers = |tag| image.get_tag_f64_vec(tag).unwrap_or_default();
-        let (scale, tie) = (numbers(Tag::ModelPixelScaleTag), numbers(Tag::ModelTiepointTag));
-        let matrix = numbers(Tag::ModelTransformationTag);
-        let keys = image.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap_or_default();
+    /// Returns the grid of an image, or what is wrong with it.
+    pub(crate) fn of(image: &mut Image) -> Result<PixelGrid, Trouble> {
+        let mut numbers = |tag| if_there(image.get_tag_f64_vec(tag));
+        let (scale, tie) = (numbers(Tag::ModelPixelScaleTag)?, numbers(Tag::ModelTiepointTag)?);
+        let matrix = numbers(Tag::ModelTransformationTag)?;
+        let keys = if_there(image.get_tag_u16_vec(Tag::GeoKeyDirectoryTag))?;
         let grid = match (scale.as_slice(), tie.as_slice(), matrix.as_slice()) {
             (&[east, north, ..], &[column, row, _, x, y, ..], _) => {
                 PixelGrid { corner: [x - column * east, y + row * north], column: [east, 0.0], row: [0.0, -north] }
@@ -75,17 +75,17 @@ fn whole(value: f64, limit: u32) -> Option<u32> {
     (value >= 0.0 && value < f64::from(limit)).then_some(value as u32)
 }
 
-/// Returns the CRS that an image says.
-pub(crate) fn crs_of<R: Read + Seek>(image: &mut Decoder<R>, warnings: &mut Warnings) -> sys::Result<Crs> {
-    let directory = image.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap_or_default();
-    let doubles = image.get_tag_f64_vec(Tag::GeoDoubleParamsTag).unwrap_or_default();
-    let texts = image.get_tag_ascii_string(Tag::GeoAsciiParamsTag).unwrap_or_default();
+/// Returns the CRS of an image, or what is wrong with it.
+pub(crate) fn crs_of(image: &mut Image, warnings: &mut Warnings) -> Result<Crs, Trouble> {
+    let directory = if_there(image.get_tag_u16_vec(Tag::GeoKeyDirectoryTag))?;
+    let doubles = if_there(image.get_tag_f64_vec(Tag::GeoDoubleParamsTag))?;
+    let texts = if_there(image.get_tag_ascii_string(Tag::GeoAsciiParamsTag))?;
     let keys = GeoKeys {
         directory: directory.iter().flat_map(|number| number.to_le_bytes()).collect(),
         doubles: doubles.iter().flat_map(|number| number.to_le_bytes()).collect(),
         texts: texts.into_bytes(),
     };
-    from_records(std::iter::empty(), &keys, warnings)
+    from_records(std::iter::empty(), &keys, warnings).map_err(|e| e.to_string().into())
 }
 
 /// Returns the way from the CRS of points to that of a picture, `None` if it is the same one or one of them is not known, or a sentence that says

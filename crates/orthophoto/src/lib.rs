@@ -9,10 +9,12 @@ mod bands;
 mod chunks;
 mod errors;
 mod georeference;
+mod image;
 mod jpeg;
 mod photo;
 #[cfg(test)]
 mod tests;
 
 pub use errors::require_file;
+pub use image::PictureBytes;
 pub use photo::Orthophoto;

@@ -2,15 +2,17 @@
 
 use crate::bands::Bands;
 use crate::chunks::Chunks;
-use crate::errors::{bad_photo, require_file};
+use crate::errors::Trouble;
 use crate::georeference::{PixelGrid, crs_of, way};
+use crate::image::PictureBytes;
 use crs::{Crs, CrsTransform};
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use sys::catch_panic::catch_panic;
-use sys::{Error, Result, Warnings, interrupt};
+use sys::{Result, Warnings, interrupt};
 use tiff::decoder::Decoder;
+
+/// What is wrong with other files.
+const NO_GEOTIFF: &str = "it is no GeoTIFF that can be read";
 
 /// An orthophoto, open to be asked for colours. Threads may share it.
 #[derive(Debug)]
@@ -34,29 +36,31 @@ struct Spot {
 }
 
 impl Orthophoto {
-    /// Opens the GeoTIFF at `path`, which is to be asked for places in the CRS `points`. It takes up to twice `most_bytes` bytes of memory.
+    /// Opens a GeoTIFF of these `bytes`, which messages call `path`. It is to be asked for places in the CRS `points`, and takes up to twice
+    /// `most_bytes` bytes of memory.
     ///
     /// # Errors
-    /// [`Error::Config`] if there is no such file; [`Error::Input`] if it is no picture that can be read, or says not where it is, or there is
-    /// no way to its CRS; [`Error::Io`] if it cannot be read.
-    pub fn open(path: &Path, points: &Crs, most_bytes: u64) -> Result<Orthophoto> {
-        require_file(path)?;
-        let file = File::open(path).map_err(Error::io("read", path))?;
-        let read = catch_panic(|| Orthophoto::read(path, file, points, most_bytes));
-        let read = read.map_err(|e| bad_photo(path, format!("it is no GeoTIFF that can be read: {e}")))?;
-        read.map_err(|what| bad_photo(path, what))
+    /// [`sys::Error::Input`] if it is no picture that can be read, does not tell where it is, or its CRS cannot be reached; [`sys::Error::Io`] if
+    /// the bytes cannot be read.
+    pub fn open(path: &Path, bytes: Box<dyn PictureBytes>, points: &Crs, most_bytes: u64) -> Result<Orthophoto> {
+        let read = catch_panic(|| Orthophoto::read(path, bytes, points, most_bytes));
+        let read = read.unwrap_or_else(|e| Err(Trouble::Bad(e.to_string()).with(NO_GEOTIFF)));
+        read.map_err(|what| what.about(path))
     }
 
-    fn read(path: &Path, file: File, points: &Crs, most_bytes: u64) -> std::result::Result<Orthophoto, String> {
-        let other = file.try_clone().map_err(|e| e.to_string())?;
-        let not_read = |e: tiff::TiffError| format!("it is no GeoTIFF that can be read: {e}");
-        let mut image = Decoder::new(BufReader::new(other)).map_err(not_read)?;
+    fn read(
+        path: &Path,
+        bytes: Box<dyn PictureBytes>,
+        points: &Crs,
+        most_bytes: u64,
+    ) -> std::result::Result<Orthophoto, Trouble> {
+        let mut image = Decoder::new(bytes).map_err(|e| Trouble::from(e).with(NO_GEOTIFF))?;
         let bands = Bands::of(&mut image)?;
         let pixels = PixelGrid::of(&mut image)?;
         let mut warnings = Warnings::default();
-        let crs = crs_of(&mut image, &mut warnings).map_err(|e| e.to_string())?;
+        let crs = crs_of(&mut image, &mut warnings)?;
         let way = way(points, &crs, &mut warnings)?;
-        let chunks = Chunks::new(image, file, bands, most_bytes)?;
+        let chunks = Chunks::new(image, bands, most_bytes)?;
         Ok(Orthophoto { path: path.into(), bands, pixels, chunks, way, warnings })
     }
 
@@ -68,7 +72,7 @@ impl Orthophoto {
     /// Returns the sRGB colours of the pixels at places in the CRS of the points; `None` outside the picture and where it is empty.
     ///
     /// # Errors
-    /// [`Error::Input`] if a tile or strip of it cannot be read; [`Error::Interrupted`].
+    /// [`sys::Error::Input`] or [`sys::Error::Io`] if a tile or strip of it cannot be read; [`sys::Error::Interrupted`].
     pub fn colors(&self, places: impl Iterator<Item = [f64; 2]>) -> Result<Vec<Option<[u8; 3]>>> {
         let pixels: Vec<_> = places.map(|place| self.pixel(place)).collect();
         let mut colors = vec![None; pixels.len()];
@@ -78,7 +82,7 @@ impl Orthophoto {
         for spots in spots.chunk_by(|one, other| one.chunk == other.chunk) {
             interrupt::check()?;
             let Some(Spot { chunk, .. }) = spots.first() else { continue };
-            let chunk = self.chunks.get(*chunk).map_err(|what| bad_photo(&self.path, what))?;
+            let chunk = self.chunks.get(*chunk).map_err(|what| what.about(&self.path))?;
             for Spot { at: [column, row], place, .. } in spots {
                 colors[*place] = self.bands.color(chunk.pixel(*column, *row, self.bands.count));
             }

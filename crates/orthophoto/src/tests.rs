@@ -1,9 +1,10 @@
 //! Pictures of a few pixels, whose colours tell their column and row.
 
-use crate::Orthophoto;
+use crate::{Orthophoto, require_file};
 use crs::from_wkt::from_epsg;
 use crs::{Crs, CrsTransform, DatumRule};
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 use sys::Error;
 use tempfile::TempDir;
@@ -18,6 +19,10 @@ const LARGE: u64 = 1 << 20;
 /// Half a unit wide pixels below and right of (1000, 2000).
 const SCALE: &[f64] = &[0.5, 0.5, 0.0];
 const TIE: &[f64] = &[0.0, 0.0, 0.0, 1000.0, 2000.0, 0.0];
+
+fn open(path: &Path, points: &Crs, most_bytes: u64) -> sys::Result<Orthophoto> {
+    Orthophoto::open(path, Box::new(BufReader::new(File::open(path).unwrap())), points, most_bytes)
+}
 
 fn color(column: u32, row: u32) -> [u8; 3] {
     [column as u8 * 30, row as u8 * 50, 7]
@@ -71,11 +76,11 @@ fn rgb() -> Vec<u8> {
 fn photo(folder: &TempDir, compression: Compression) -> Orthophoto {
     let path = folder.path().join("photo.tif");
     write::<RGB8>(&path, compression, &PLACE, &rgb());
-    Orthophoto::open(&path, &Crs::default(), LARGE).unwrap()
+    open(&path, &Crs::default(), LARGE).unwrap()
 }
 
 fn refusal(path: &Path, points: &Crs, most_bytes: u64) -> String {
-    let error = Orthophoto::open(path, points, most_bytes).unwrap_err();
+    let error = open(path, points, most_bytes).unwrap_err();
     assert!(matches!(error, Error::Input { .. }), "{error}");
     let said = error.to_string();
     assert!(said.contains("photo.tif: [output] color: "), "{said}");
@@ -121,7 +126,7 @@ fn where_a_picture_is_clear_or_has_no_data_there_is_no_colour() {
     let tags: [(Tag, &dyn Fn() -> Values); 3] = [PLACE[0], PLACE[1], (Tag::ExtraSamples, &|| Values::Shorts(vec![2]))];
     write::<RGBA8>(&path, Compression::Lzw, &tags, &all_pixels().flat_map(rgba).collect::<Vec<u8>>());
     let middles = || all_pixels().map(|(column, row)| middle(column, row));
-    let found = Orthophoto::open(&path, &Crs::default(), LARGE).unwrap().colors(middles()).unwrap();
+    let found = open(&path, &Crs::default(), LARGE).unwrap().colors(middles()).unwrap();
     for ((column, row), found) in all_pixels().zip(found) {
         assert_eq!(found, (!is_clear(column, row)).then(|| color(column, row)));
     }
@@ -129,7 +134,7 @@ fn where_a_picture_is_clear_or_has_no_data_there_is_no_colour() {
     data[..3].fill(9);
     let tags: [(Tag, &dyn Fn() -> Values); 3] = [PLACE[0], PLACE[1], (Tag::GdalNodata, &|| Values::Text("9".into()))];
     write::<RGB8>(&path, Compression::Uncompressed, &tags, &data);
-    let found = Orthophoto::open(&path, &Crs::default(), LARGE).unwrap().colors(middles()).unwrap();
+    let found = open(&path, &Crs::default(), LARGE).unwrap().colors(middles()).unwrap();
     assert_eq!(found.iter().filter(|color| color.is_none()).count(), 1);
     assert_eq!((found[0], found[1]), (None, Some(color(1, 0))));
 }
@@ -146,7 +151,7 @@ fn a_turned_picture_is_read_by_its_matrix() {
         &[(Tag::ModelTransformationTag, &|| Values::Doubles(matrix.to_vec()))],
         &rgb(),
     );
-    let photo = Orthophoto::open(&path, &Crs::default(), LARGE).unwrap();
+    let photo = open(&path, &Crs::default(), LARGE).unwrap();
     let place = |(column, row)| [100.0 + 2.0 * (f64::from(row) + 0.5), 200.0 + 3.0 * (f64::from(column) + 0.5)];
     let wanted: Vec<_> = all_pixels().map(|(column, row)| Some(color(column, row))).collect();
     assert_eq!(photo.colors(all_pixels().map(place)).unwrap(), wanted);
@@ -165,7 +170,7 @@ fn places_are_brought_into_the_system_of_the_picture() {
     let path = folder.path().join("photo.tif");
     write::<RGB8>(&path, Compression::Uncompressed, &DEGREES, &rgb());
     let [utm, degrees] = [32632, 4326].map(|code| from_epsg(code).unwrap());
-    let photo = Orthophoto::open(&path, &utm, LARGE).unwrap();
+    let photo = open(&path, &utm, LARGE).unwrap();
     assert!(photo.warnings.is_empty(), "{:?}", photo.warnings);
     let to_utm = CrsTransform::between(&degrees, &utm, DatumRule::Strict).unwrap();
     let place = |(column, row)| {
@@ -174,9 +179,9 @@ fn places_are_brought_into_the_system_of_the_picture() {
     let wanted: Vec<_> = all_pixels().map(|(column, row)| Some(color(column, row))).collect();
     assert_eq!(photo.colors(all_pixels().map(place)).unwrap(), wanted);
     // ETRS89 and WGS 84 are a metre apart at most.
-    let close = Orthophoto::open(&path, &from_epsg(25832).unwrap(), LARGE).unwrap();
+    let close = open(&path, &from_epsg(25832).unwrap(), LARGE).unwrap();
     assert!(close.warnings.iter().any(|warning| warning.contains("one datum")), "{:?}", close.warnings);
-    let nameless = Orthophoto::open(&path, &Crs::default(), LARGE).unwrap();
+    let nameless = open(&path, &Crs::default(), LARGE).unwrap();
     assert!(nameless.warnings.iter().any(|warning| warning.contains("no CRS")), "{:?}", nameless.warnings);
 }
 
@@ -186,7 +191,7 @@ fn jpeg_tiles_are_those_that_gdal_writes() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("photo.tif");
     std::fs::write(&path, include_bytes!("jpeg-tiles.tif")).unwrap();
-    let photo = Orthophoto::open(&path, &from_epsg(32632).unwrap(), LARGE).unwrap();
+    let photo = open(&path, &from_epsg(32632).unwrap(), LARGE).unwrap();
     let pixels = || (0..24_u32).flat_map(|row| (0..40_u32).map(move |column| [column, row]));
     let place = |[column, row]: [u32; 2]| [500_000.25 + 0.5 * f64::from(column), 4_999_999.75 - 0.5 * f64::from(row)];
     let found = photo.colors(pixels().map(place)).unwrap();
@@ -225,14 +230,58 @@ fn what_cannot_be_read_is_refused_with_a_way_out() {
     other[at + 8..at + 10].copy_from_slice(&34925_u16.to_le_bytes());
     std::fs::write(&path, other).unwrap();
     assert!(refusal(&path, &none, LARGE).contains("COMPRESS=DEFLATE"));
-    let missing = Orthophoto::open(&folder.path().join("none.tif"), &none, LARGE).unwrap_err();
+    let missing = require_file(&folder.path().join("none.tif")).unwrap_err();
     assert!(matches!(&missing, Error::Config(what) if what.contains("none.tif")), "{missing}");
     // A file that is cut off anywhere is refused, or its colours are, and nothing panics.
     for end in 0..whole.len() {
         std::fs::write(&path, &whole[..end]).unwrap();
-        if let Ok(photo) = Orthophoto::open(&path, &none, LARGE) {
+        if let Ok(photo) = open(&path, &none, LARGE) {
             let error = photo.colors(all_pixels().map(|(column, row)| middle(column, row)));
             assert!(error.is_err() || end + 8 > whole.len(), "{end} of {} bytes are enough", whole.len());
         }
+    }
+}
+
+/// Bytes of a server that breaks down after some of them.
+struct Breaking {
+    bytes: Cursor<Vec<u8>>,
+    left: usize,
+}
+
+impl Read for Breaking {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        self.left = self.left.checked_sub(out.len()).ok_or_else(|| io::Error::other("no answer"))?;
+        self.bytes.read(out)
+    }
+}
+
+impl Seek for Breaking {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.bytes.seek(to)
+    }
+}
+
+/// What is not handed out may be there another time. That is no fault of the picture.
+#[test]
+fn bytes_that_do_not_come_are_no_bad_picture() {
+    let folder = TempDir::new().unwrap();
+    for compression in [Compression::Uncompressed, Compression::Deflate(Default::default())] {
+        let path = folder.path().join("photo.tif");
+        write::<RGB8>(&path, compression, &PLACE, &rgb());
+        let bytes = std::fs::read(&path).unwrap();
+        let mut refused = 0;
+        for left in 0..bytes.len() {
+            let bytes = Box::new(Breaking { bytes: Cursor::new(bytes.clone()), left });
+            let middles = all_pixels().map(|(column, row)| middle(column, row));
+            let found = Orthophoto::open(&path, bytes, &Crs::default(), LARGE);
+            if let Err(error) = found.and_then(|photo| photo.colors(middles)) {
+                assert!(
+                    matches!(&error, Error::Io { source, .. } if source.to_string() == "no answer"),
+                    "{left}: {error}"
+                );
+                refused += 1;
+            }
+        }
+        assert!(refused > bytes.len() / 4, "{refused} of {}", bytes.len());
     }
 }

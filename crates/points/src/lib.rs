@@ -38,7 +38,7 @@ mod windows_1252;
 
 pub use decoded_chunks::DecodedChunks;
 pub use ept::name::is_ept;
-pub use file::random_access::not_a_file;
+pub use file::random_access::{not_a_file, open_bytes};
 pub use las::classified::{ClassifiedRecord, write_classified};
 pub use lists::listed_cloud::{ListedBox, ListedCloud};
 pub use lists::listed_clouds;
@@ -58,7 +58,7 @@ pub use points::returns::KeptReturns;
 pub use points::rules::PointRules;
 pub use read_ahead::ReadAhead;
 pub use remote::files::{remote_files, set_network_memory};
-pub use remote::name::is_url;
+pub use remote::name::{is_url, public_name};
 pub use remote::traffic::NetworkTraffic;
 pub use source::{FileFormat, Source, open, open_chosen};
 pub use text::options::TextOptions;

@@ -316,7 +316,9 @@ impl From<ColorChoice> for String {
 
 /// Tells whether a text is the name of a TIFF, as a word for colours never is.
 fn is_name_of_tiff(text: &str) -> bool {
-    let ending = Path::new(text).extension().map(|ending| ending.to_ascii_lowercase());
+    // A URL may have a query.
+    let name = if text.contains("://") { text.split(['?', '#']).next().unwrap_or_default() } else { text };
+    let ending = Path::new(name).extension().map(|ending| ending.to_ascii_lowercase());
     ending.is_some_and(|ending| ending == "tif" || ending == "tiff")
 }
 

@@ -10,7 +10,8 @@ use crate::records::JobStep;
 use crs::geoid::errors::not_opened;
 use crs::geoid::option::HeightOffset;
 use crs::geoid::require_file;
-use orthophoto::require_file as require_photo;
+use orthophoto::require_file as require_picture;
+use points::is_url;
 use points::lines::files_of_lines;
 use points::samples::fingerprint_of;
 use serde::{Deserialize, Serialize};
@@ -332,6 +333,14 @@ fn style_of(output: &OutputOptions) -> Result<Map<String, Value>> {
         style.insert("[output] color".into(), format!("an orthophoto with the samples {content}").into());
     }
     Ok(style)
+}
+
+/// Checks that there is an orthophoto at `path`, if that is on this machine. A server tells when it is asked.
+///
+/// # Errors
+/// As [`require_picture`].
+pub(crate) fn require_photo(path: &Path) -> Result<()> {
+    if path.to_str().is_some_and(is_url) { Ok(()) } else { require_picture(path) }
 }
 
 /// Returns the options of a table by the names that the user knows.

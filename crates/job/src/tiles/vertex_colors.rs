@@ -1,10 +1,12 @@
 //! Where the colours of vertices come from.
 
 use crate::options::JobOptions;
+use crate::plan::fingerprint::require_photo;
 use crate::plan::job_plan::Plan;
 use crate::records::Leaf;
 use lattice::Lattice;
 use orthophoto::Orthophoto;
+use points::open_bytes;
 use std::path::Path;
 use sys::{Result, Warnings};
 use tiles::color::{Coloring, LinearRgb, from_srgb};
@@ -69,9 +71,11 @@ impl PhotoColors {
     /// Opens the orthophoto at `path` for the vertices of a job.
     ///
     /// # Errors
-    /// As [`Orthophoto::open`].
+    /// As [`require_photo`], [`open_bytes`] and [`Orthophoto::open`].
     pub(crate) fn open(plan: &Plan, path: &Path) -> Result<PhotoColors> {
-        let photo = Orthophoto::open(path, &plan.crs, most_bytes(&plan.options))?;
+        require_photo(path)?;
+        let bytes = Box::new(open_bytes(path)?);
+        let photo = Orthophoto::open(path, bytes, &plan.crs, most_bytes(&plan.options))?;
         Ok(PhotoColors { photo, lattice: plan.lattice.clone() })
     }
 

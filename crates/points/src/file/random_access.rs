@@ -1,7 +1,7 @@
 //! A file that any thread may read at any position, of this machine or of another one.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read, Seek};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -141,6 +141,15 @@ impl RandomAccessFile {
         };
         Ok(FileRange::new(source, range, read_ahead))
     }
+}
+
+/// Opens a file of this machine, or one by URL that is called `path` in public.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read; [`Error::Config`] if there is none at a URL; [`Error::Input`] if it is no regular file.
+pub fn open_bytes(path: &Path) -> Result<impl Read + Seek + Send + use<>> {
+    let file = RandomAccessFile::open(path)?;
+    file.range(0..file.size())
 }
 
 /// Returns a sentence about what is at `path` if it is there and no regular file.

@@ -42,7 +42,7 @@ pub(crate) fn is_remote(path: &Path) -> bool {
 ///
 /// # Errors
 /// A sentence about a URL that no file can be read by. It does not tell the query.
-pub(crate) fn public_name(url: &str) -> std::result::Result<String, String> {
+pub fn public_name(url: &str) -> std::result::Result<String, String> {
     let found = scheme(url).unwrap_or_default();
     let rest = url.get(found.len() + 3..).unwrap_or_default();
     let Some(known) = SCHEMES.into_iter().find(|known| found.eq_ignore_ascii_case(known)) else {
