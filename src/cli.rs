@@ -235,7 +235,7 @@ pub enum CliCommand {
     },
     /// Show what point clouds contain.
     Info {
-        /// Point clouds: LAS, LAZ, COPC, EPT or text, or lists of them.
+        /// Point clouds: LAS, LAZ, COPC, EPT or text, folders, or lists of them.
         #[arg(required = true)]
         files: Vec<PathBuf>,
         /// Read all points, and count those of each class and of each return.

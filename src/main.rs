@@ -17,6 +17,7 @@ use gdt_batch::submit::{Engine, kubernetes, slurm};
 use gdt_batch::{completions, config, init, manual, sample};
 use job::options::{JobOptions, RunOptions, Threads};
 use job::phase::{Phase, PhaseTasks, Task};
+use job::plan::folder_files::FolderFiles;
 use job::preflight::check;
 use job::report::job_report::Report;
 use job::report::skipped_inputs::skipped_summary;
@@ -487,14 +488,15 @@ fn show_info(files: &[PathBuf], histogram: bool, print: PrintOptions) -> Result<
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the files that a command line names: those of this machine, which must be there, those that its URLs mean, and those that a list
-/// names.
+/// Returns the files that a command line names: those of this machine, which must be there, the point clouds in folders, those that its URLs mean,
+/// and those that a list names.
 fn named(files: &[PathBuf]) -> sys::Result<Vec<PathBuf>> {
     let files_of = |file: &PathBuf| match file.to_str() {
         Some(url) if points::is_url(url) => points::remote_files(url),
         _ if file.symlink_metadata().is_err_and(|e| e.kind() == ErrorKind::NotFound) => {
             Err(sys::Error::Config(format!("there is no file {}: correct its name", file.display())))
         }
+        _ if file.is_dir() => FolderFiles::of(file)?.clouds(&points::TextOptions::default()).map(|found| found.clouds),
         _ => Ok(vec![file.clone()]),
     };
     let of_list = |file: PathBuf| match points::listed_clouds(&file)? {

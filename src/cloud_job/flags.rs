@@ -17,7 +17,7 @@ pub(crate) struct Flag {
 }
 
 /// The flags that are lines of a configuration and no paths.
-const FLAGS: [Flag; 12] = [
+const FLAGS: [Flag; 13] = [
     Flag { name: "surface", table: "input", key: "surface", value: |given| text(&given.surface) },
     Flag {
         name: "bounds",
@@ -34,8 +34,9 @@ const FLAGS: [Flag; 12] = [
         name: "height-offset",
         table: "output",
         key: "height_offset",
-        value: |given| given.height_offset.map(offset),
+        value: |given| given.height_offset.as_ref().map(offset),
     },
+    Flag { name: "color", table: "output", key: "color", value: |given| text(&given.color) },
     Flag { name: "raster", table: "output", key: "raster", value: |given| given.raster.map(raster) },
     Flag { name: "export", table: "output", key: "export", value: |given| words(&given.export) },
     Flag { name: "contours", table: "output", key: "contours", value: |given| given.contours.map(contours) },
@@ -64,10 +65,11 @@ fn list(sides: [f64; 4]) -> Value {
     sides.to_vec().into()
 }
 
-fn offset(given: Offset) -> Value {
+fn offset(given: &Offset) -> Value {
     match given {
         Offset::Egm96 => "egm96".into(),
-        Offset::Metres(metres) => metres.into(),
+        Offset::Metres(metres) => (*metres).into(),
+        Offset::Grid(path) => path.as_str().into(),
     }
 }
 
@@ -158,9 +160,10 @@ pub fn in_flags(text: &str) -> String {
 pub fn refuse_beside_command(options: &CloudOptions) -> Result<()> {
     let writes = options.write_config.as_ref().map(|_| "--write-config".to_string());
     match given(options).map(Flag::name).or(writes) {
-        Some(name) => {
-            Err(Error::Config(format!("{name} is for point clouds, as in gdt-batch cloud.laz: no command takes it")))
-        }
+        Some(name) => Err(Error::Config(format!(
+            "{name} is for jobs of point clouds, as in gdt-batch cloud.laz; a command takes the configuration that --write-config job.toml \
+                 writes of them"
+        ))),
         None => Ok(()),
     }
 }

@@ -3,7 +3,8 @@
 use crate::config;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueHint};
-use std::path::PathBuf;
+use points::is_url;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// What to make of point clouds without a configuration.
@@ -46,7 +47,10 @@ pub struct CloudOptions {
     /// The unit of x and y, if the files name none.
     #[arg(long, value_name = "UNIT", value_parser = choice("[input]", "unit"))]
     pub unit: Option<String>,
-    /// What to add to heights so that they are above the ellipsoid, as the globe needs them: egm96, or metres.
+    /// Colours of the vertices: an orthophoto (GeoTIFF, also by URL), or rgb, elevation, class or none.
+    #[arg(long, value_name = "COLOR", value_parser = color)]
+    pub color: Option<String>,
+    /// What to add to heights so that they are above the ellipsoid, as the globe needs them: egm96, a geoid grid, or metres.
     #[arg(long, value_name = "OFFSET", value_parser = offset, allow_negative_numbers = true)]
     pub height_offset: Option<Offset>,
     /// What to do about a file that is damaged or no point cloud: stop, or leave it out.
@@ -63,20 +67,39 @@ fn choice(table: &str, key: &str) -> PossibleValuesParser {
 }
 
 /// What to add to heights.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Offset {
     /// The heights of a geoid that is built in.
     Egm96,
     /// So many metres.
     Metres(f64),
+    /// The heights of this geoid grid.
+    Grid(String),
 }
 
 fn offset(text: &str) -> Result<Offset, String> {
     match (text, text.parse()) {
         ("egm96", _) => Ok(Offset::Egm96),
         (_, Ok(metres)) => Ok(Offset::Metres(metres)),
-        _ => Err("give egm96 or a number of metres; a geoid grid goes into a configuration, see --write-config".into()),
+        _ if Path::new(text).extension().is_some() => whole_path(text).map(Offset::Grid),
+        _ => Err("give egm96, a geoid grid such as geoid.tif, or a number of metres".into()),
     }
+}
+
+/// Returns a colour option, in which the path of a picture is whole: a configuration counts paths from its own folder.
+fn color(text: &str) -> Result<String, String> {
+    match !is_url(text) && Path::new(text).extension().is_some() {
+        true => whole_path(text),
+        false => Ok(text.into()),
+    }
+}
+
+fn whole_path(text: &str) -> Result<String, String> {
+    let whole = std::path::absolute(text).map_err(|error| error.to_string())?;
+    whole
+        .into_os_string()
+        .into_string()
+        .map_err(|_| "the path of the current folder is no Unicode: work in another folder".into())
 }
 
 fn number(text: &str) -> Result<f64, String> {

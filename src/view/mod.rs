@@ -98,6 +98,15 @@ fn terrain_in(directory: &Path) -> Result<&'static str> {
     if files.terrain().is_file() {
         return Ok("terrain.glb");
     }
+    if let (true, Some(folder)) = (directory.is_file(), directory.parent()) {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        return Err(sys::Error::Config(format!(
+            "{} is a file: name the [output] directory of a job, as in `gdt-batch view {}`",
+            directory.display(),
+            folder.display()
+        ))
+        .into());
+    }
     if files.journal().is_file() {
         return Err(verify::Error::Unfinished { directory: directory.into() }.into());
     }

@@ -22,6 +22,8 @@ use sys::{Error, Result};
 
 /// An edge is long from this many times the mean spacing of all points on.
 const SPACINGS: u64 = 10;
+/// The same where classes or returns are chosen, or the ground is found: points on the ground are farther apart than all, often by three times.
+const SPACINGS_OF_CHOSEN: u64 = 30;
 /// The same where `max_error` selects few of them. A triangle on ground does not flow then, so triangles with such edges are listed: there are
 /// at most a few for each thousand points.
 const SPACINGS_OF_SELECTED: u64 = 50;
@@ -56,7 +58,11 @@ impl HullRule {
 
     /// Returns the rule that takes no triangle for one on ground.
     pub(crate) fn of_lengths(plan: &Plan) -> HullRule {
-        let spacings = if plan.options.output.selects() { SPACINGS_OF_SELECTED } else { SPACINGS };
+        let spacings = match (plan.options.output.selects(), plan.options.input.chooses_kinds()) {
+            (true, _) => SPACINGS_OF_SELECTED,
+            (false, true) => SPACINGS_OF_CHOSEN,
+            (false, false) => SPACINGS,
+        };
         let (records, area) = plan.density();
         HullRule::of_points(records, area, spacings)
     }

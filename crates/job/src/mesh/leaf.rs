@@ -11,7 +11,7 @@ use crate::partition::point_file::PointFiles;
 use crate::partition::result::Partition;
 use crate::plan::job_plan::Plan;
 use crate::records::{BorderVertex, Leaf, PartialNormals, Store};
-use delaunay::geometry::Site;
+use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::mesh::index::{HalfEdgeIndex, SiteIndex};
 use delaunay::triangulation;
@@ -35,6 +35,8 @@ pub struct LeafStats {
     pub triangles: u64,
     /// The digest of the sites with their heights.
     pub vertices: VertexDigest,
+    /// The lattice box of the sites; `None` without any.
+    pub bounds: Option<Bounds<3>>,
     /// How the leaves were triangulated.
     pub outcome: TriangulationCounts,
 }
@@ -45,6 +47,7 @@ impl AddAssign for LeafStats {
         self.duplicates += other.duplicates;
         self.triangles += other.triangles;
         self.vertices = self.vertices.join(other.vertices);
+        self.bounds = [self.bounds, other.bounds].into_iter().flatten().reduce(Bounds::union);
         self.outcome += other.outcome;
     }
 }
@@ -87,7 +90,8 @@ pub fn triangulate_leaf(
     }
     triangulation::recycle(mesh);
     let vertices = VertexDigest::of(points.iter().map(Point::corner));
-    Ok(LeafStats { sites: sites.len() as u64, duplicates, triangles, vertices, outcome })
+    let bounds = Bounds::of_points(points.iter().map(Point::corner));
+    Ok(LeafStats { sites: sites.len() as u64, duplicates, triangles, vertices, bounds, outcome })
 }
 
 /// Checks that single precision can hold all final triangles.

@@ -5,6 +5,7 @@
 
 use crate::plan::height_groups::{HeightBins, HeightGroup};
 use delaunay::geometry::{Bounds, Site, bounds_of};
+use ground::{CoveredArea, Ground, GroundSizes, LowestHeights, MetricLattice, PointCollector};
 use points::{DecodedChunks, Extremes, OptionalFields, PointCounts, PointRules, Source};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -155,6 +156,23 @@ impl HeightSample {
             u64::from(values[count - 1 - cut].abs_diff(values[cut]))
         };
         (count >= LEAST_POINTS).then(|| length(0).max(length(1)))
+    }
+
+    /// Returns the sample with the heights of those points alone that lie on the ground, as far as the sample shows it. All stay if none does.
+    ///
+    /// # Errors
+    /// [`sys::Error::Interrupted`].
+    pub(crate) fn on_ground(self, lattice: MetricLattice, sizes: GroundSizes) -> Result<HeightSample> {
+        let corners = || self.points.iter().map(|([x, y], z)| [*x, *y, *z]);
+        let mut area = CoveredArea::new(lattice);
+        area.add(corners());
+        let mut lowest = LowestHeights::new(&area);
+        lowest.add(corners());
+        let ground = Ground::find(&lowest, sizes, interrupt::check)?;
+        let mut heights: Vec<i32> =
+            corners().filter(|corner| ground.has(*corner)).map(|[_, _, height]| height).collect();
+        heights.sort_unstable();
+        Ok(if heights.is_empty() { self } else { HeightSample { heights, ..self } })
     }
 
     /// Returns the heights that colours span, without what may be noise; `None` if the sample has too few points to tell. Where the

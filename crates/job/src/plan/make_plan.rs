@@ -30,6 +30,7 @@ use crs::CrsChoice;
 use crs::DatumRule;
 use delaunay::geometry::Bounds;
 use delaunay::geometry::REACH;
+use ground::MetricLattice;
 use lattice::{AxisMap, Lattice, shortest_decimal};
 use points::lines::line_crs::SystemOfPoints;
 use points::options::{OnBadFile, UnitChoice};
@@ -252,6 +253,10 @@ fn try_plan(
     let lines_at = breaklines.as_ref().and_then(|lines| lines.bounds);
     let claims = claims.map(|claims| claims.with_lines(lines_at));
     let [low, high] = claimed_heights(&lattice, &extent).map(|z| z.round() as i32);
+    let [horizontal, vertical] = frame.resolution_metres();
+    let metric = MetricLattice { horizontal, vertical, offset: lattice.steps_from_zero() };
+    let sample =
+        if options.input.finds_ground() { sample.on_ground(metric, options.input.bare_earth)? } else { sample };
     let heights = sample.range_within(HeightRange { low, high });
     let plan = Plan {
         claims,

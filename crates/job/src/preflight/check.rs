@@ -329,7 +329,7 @@ impl fmt::Display for Preflight {
         let mut row = |name: &str, value: String| writeln!(f, "{name:<18} {value}");
         row("points", grouped(self.records))?;
         if self.kept < self.records {
-            row("points kept", format!("about {} or fewer", grouped(self.kept)))?;
+            row("points kept", format!("about {}", grouped(self.kept)))?;
         }
         if let Some(surface) = &self.surface {
             row("surface", surface.clone())?;

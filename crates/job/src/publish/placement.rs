@@ -144,6 +144,10 @@ pub(crate) fn heights_warning(crs: &Crs, offset: Option<&HeightOffset>) -> Optio
         }
         _ if offset.is_some() => return None,
         Some(system) => format!("heights are above {}", system.label()),
+        None if crs.vertical.is_none() => format!(
+            "vertical datum and unit unknown: heights are taken to be in the unit of x and y ({}), and may be above sea level",
+            crs.horizontal.name()
+        ),
         None => "vertical datum unknown: heights may be above sea level".to_string(),
     };
     Some(format!(

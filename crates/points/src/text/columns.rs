@@ -285,8 +285,8 @@ fn names_warning(found: Option<&NamedColumns>, is_foot_unclear: bool, columns: u
             "it has no header, so its first three columns are x, y and z; fix: [input.csv] columns, if that is wrong"
         }
         Some(_) if is_foot_unclear => {
-            "its columns are in feet of an unknown kind: international feet (0.3048 m) assumed; fix: [input] unit = \"us-foot\" for US \
-             survey feet"
+            "its columns are in feet of an unknown kind: international feet (0.3048 m) assumed; fix: us-ft in the names of its columns, as \
+             in \"z [us-ft]\", for US survey feet"
         }
         _ => return None,
     };

@@ -82,7 +82,7 @@ pub(crate) fn publish_job(
     }
     let tileset = wants_tileset.then(|| levels_and_root(run, job, stores, joined, &figures));
     let (tiles, hull) = (&TilesOfParts { job, stores }, joined.hull_count(job, stores)?);
-    let written = WrittenFiles { stats: figures.tiles, hull, tiles };
+    let written = WrittenFiles { stats: figures.tiles, vertices: figures.leaves.bounds.unwrap_or(bounds), hull, tiles };
     let mut published = publish(run, job, bounds, &written, &joined.appearance, tileset.transpose()?)?;
     published.warnings.extend(grown_parts(job.plan, &figures.points));
     let peak_memory = parts.iter().map(PartProgress::peak_memory).max().flatten().max(joined.peak_memory);
@@ -253,6 +253,8 @@ pub(crate) fn wants_tileset(plan: &Plan, written: &TileStats) -> bool {
 /// The tiles that are written.
 struct WrittenFiles<'a> {
     stats: TileStats,
+    /// The lattice box of all vertices.
+    vertices: Bounds<3>,
     /// How many slivers along the hull the whole mesh has.
     hull: HullCount,
     tiles: &'a dyn EachTile,
@@ -368,8 +370,13 @@ fn publish(
         warnings.extend(raster.warnings);
         raster.stats
     });
-    let georeference =
-        Georeference::new(&appearance.style.frame, &plan.lattice, bounds, &plan.unit, plan.crs.undisputed_code());
+    let georeference = Georeference::new(
+        &appearance.style.frame,
+        &plan.lattice,
+        written.vertices,
+        &plan.unit,
+        plan.crs.undisputed_code(),
+    );
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);
     let page_of_others = output.page && run.directory.has_page_of_others()?;
@@ -460,7 +467,7 @@ fn write_contours(run: &WholeRun, plan: &Plan, frame: &Frame, tiles: &dyn EachTi
 /// Those of [`ExportWork`].
 fn write_exports(run: &WholeRun, plan: &Plan, frame: &Frame, written: &WrittenFiles) -> Result<Exports> {
     let Some(work) = ExportWork::of(plan, frame, written.tiles, &written.stats)? else { return Ok(Exports::default()) };
-    let stage = run.progress.stage("export", work.reads(), "triangles");
+    let stage = run.progress.stage("export", work.reads(), "triangles read");
     let advance = |triangles| stage.advance(triangles);
     let exports = run.journal.step(JobStep::Exports, || work.write(run.directory, &advance))?;
     run.add_stage(stage.finish());
