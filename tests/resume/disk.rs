@@ -55,7 +55,7 @@ exit $code
 fn mounting(rig: &Rig, kibibytes: u64) -> Command {
     let mut command = Command::new("unshare");
     command.args(["--user", "--map-root-user", "--mount", "bash", "-c", FILL, env!("CARGO_BIN_EXE_gdt-batch")]);
-    command.arg(kibibytes.to_string()).current_dir(rig.folder.path());
+    command.arg(kibibytes.to_string()).current_dir(rig.folder.path()).envs(rig.environment());
     command
 }
 
@@ -109,7 +109,8 @@ fn can_mount() -> bool {
 
 #[test]
 fn a_job_whose_disk_was_full_at_any_stage_goes_on_when_there_is_room() {
-    let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000));
+    let setup = Setup::tiles_of(2_000);
+    let rig = Rig::new(&scattered::gaussian(20_000), &setup).with_usual_preview(&setup);
     if !can_mount() {
         eprintln!("skipped: no file system can be mounted here");
         return;
