@@ -5,6 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use tiles::preview::canvas::LONGER_SIDE;
+
 #[path = "../build.rs"]
 #[expect(dead_code, reason = "cargo runs it")]
 mod build_script;
@@ -45,9 +47,12 @@ fn no_environment_variable_kills_the_installed_program() {
     for fault in FAULTS {
         let mut program = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
         program.arg("job.toml").current_dir(folder.path()).env("GDT_FAULT", fault);
-        let output = program.env("GDT_TRACE", "trace").output().unwrap();
+        let output = program.envs([("GDT_TRACE", "trace"), ("GDT_PREVIEW", "100")]).output().unwrap();
         assert!(output.status.success(), "{fault}: {output:?}");
         assert!(!folder.path().join("trace").exists(), "changes of files are written down");
+        let preview = fs::read(folder.path().join("out/preview.png")).unwrap();
+        let preview = png::Decoder::new(std::io::Cursor::new(preview)).read_info().unwrap();
+        assert_eq!(preview.info().width, LONGER_SIDE as u32);
     }
 }
 

@@ -21,7 +21,7 @@ fn stays_within(report: &Value, mebibytes: u64) {
 fn three_million_points_fit_in_128_mib() {
     let folder = tempfile::tempdir().unwrap();
     gdt_batch(folder.path(), &["sample", "terrain.las", "--points", "3000000"]).succeeded();
-    let job = Job::on(&[folder.path().join("terrain.las")]).with("limits", "memory = \"128 MiB\"");
+    let job = Job::on(&[folder.path().join("terrain.las")]).usual_preview().with("limits", "memory = \"128 MiB\"");
     let report = job.report();
     assert_eq!(number(&report["points"]["read"]), 3_000_000);
     stays_within(&report, 128);
@@ -36,7 +36,7 @@ fn a_crowd_in_one_corner_fits_in_128_mib() {
     cloud.extend([[6_000_000, 6_000_000, 0], [6_000_000, 0, 0], [0, 6_000_000, 0]]);
     let file = clouds::write(folder.path(), "crowd.csv", &cloud);
     drop(cloud);
-    let job = Job::on(&[file]).with("limits", "memory = \"128 MiB\"");
+    let job = Job::on(&[file]).usual_preview().with("limits", "memory = \"128 MiB\"");
     stays_within(&job.report(), 128);
     job.verified();
 }
@@ -47,7 +47,7 @@ fn two_million_points_on_one_spot_fit_in_128_mib() {
     let mut cloud = vec![[500, 500, 7]; 2_000_000];
     cloud.extend(clouds::uniform(1_000, 1_000, 3));
     let file = clouds::write(folder.path(), "spot.csv", &cloud);
-    let job = Job::on(&[file]).with("limits", "memory = \"128 MiB\"");
+    let job = Job::on(&[file]).usual_preview().with("limits", "memory = \"128 MiB\"");
     let report = job.report();
     assert!(number(&report["duplicates"]) >= 1_999_999);
     stays_within(&report, 128);
@@ -59,7 +59,8 @@ fn two_million_points_on_one_spot_fit_in_128_mib() {
 fn coarser_tiles_of_many_threads_fit_in_256_mib() {
     let folder = tempfile::tempdir().unwrap();
     let file = clouds::write(folder.path(), "square.csv", &clouds::uniform(2_000_000, 100_000, 8));
-    let job = Job::on(&[file]).with("limits", "memory = \"256 MiB\"").with("output", "format = \"3dtiles\"");
+    let job =
+        Job::on(&[file]).usual_preview().with("limits", "memory = \"256 MiB\"").with("output", "format = \"3dtiles\"");
     stays_within(&job.threads(16).processors(8).tiles_of(5_000).report(), 256);
 }
 
@@ -82,7 +83,7 @@ fn tiles_too_large_for_the_memory_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let [few, many] = [1_000, 250_000].map(|count| {
         let file = clouds::write(folder.path(), &format!("{count}.csv"), &clouds::uniform(count, 100_000, 3));
-        Job::on(&[file]).tiles_of(5_000_000).with("limits", "memory = \"128 MiB\"")
+        Job::on(&[file]).tiles_of(5_000_000).usual_preview().with("limits", "memory = \"128 MiB\"")
     });
     many.run().refused(2, &["max_points_per_tile", "memory"]);
     few.digest();
@@ -99,7 +100,9 @@ fn advised(said: &Said) -> String {
 fn one_raise_of_the_memory_suffices_for_large_tiles() {
     let folder = tempfile::tempdir().unwrap();
     let file = clouds::write(folder.path(), "many.csv", &clouds::uniform(250_000, 100_000, 3));
-    let job = |memory: &str| Job::on(&[&file]).tiles_of(5_000_000).with("limits", &format!("memory = {memory:?}"));
+    let job = |memory: &str| {
+        Job::on(&[&file]).usual_preview().tiles_of(5_000_000).with("limits", &format!("memory = {memory:?}"))
+    };
     let said = job("128M").run();
     said.refused(2, &["max_points_per_tile"]);
     let job = job(&advised(&said));

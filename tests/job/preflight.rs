@@ -62,6 +62,7 @@ fn the_disk_estimate_is_close_to_what_the_job_writes() {
         ("strip in parts", strip().with("triangulation", "max_points_per_part = 10000")),
         ("few points", few()),
     ] {
+        let job = job.usual_preview();
         let estimate = job.run_with(&["check", "--json"]).succeeded().json();
         let report = job.report();
         let ratio = |estimated: u64, real: u64| estimated as f64 / real as f64;

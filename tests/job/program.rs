@@ -12,6 +12,9 @@ use tempfile::TempDir;
 /// Longer than any job of the tests takes on a slow machine. A run that takes longer hangs.
 const HANGS: Duration = Duration::from_secs(300);
 
+/// Makes a preview as large as that of users. `tests/run` has smaller ones, which take less time.
+const USUAL_PREVIEW: (&str, &str) = ("GDT_PREVIEW", "1024");
+
 /// The exit code and the output of a run.
 #[derive(Debug)]
 pub(crate) struct Said {
@@ -66,17 +69,22 @@ pub(crate) fn gdt_batch_into(out: &str, folder: &Path, arguments: &[&str]) -> Sa
 /// Runs the program with `mebibytes` of address space, so that it cannot even ask for more.
 #[track_caller]
 pub(crate) fn gdt_batch_within(mebibytes: u64, folder: &Path, arguments: &[&str]) -> Said {
-    gdt_batch_within_kib(mebibytes * 1024, folder, arguments)
+    finish(&mut within(mebibytes * 1024, folder, arguments))
 }
 
-/// Runs the program with `kibibytes` of address space.
+/// Runs the program with `kibibytes` of address space. A preview takes what it takes of users.
 #[track_caller]
 pub(crate) fn gdt_batch_within_kib(kibibytes: u64, folder: &Path, arguments: &[&str]) -> Said {
+    finish(within(kibibytes, folder, arguments).envs([USUAL_PREVIEW]))
+}
+
+fn within(kibibytes: u64, folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new("sh");
     command.arg("-c").arg(format!("ulimit -v {kibibytes} && exec \"$0\" \"$@\""));
     // Without memory a stack trace takes longer than the run.
     command.env("RUST_BACKTRACE", "0");
-    finish(command.arg(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder))
+    command.arg(env!("CARGO_BIN_EXE_gdt-batch")).args(arguments).current_dir(folder);
+    command
 }
 
 /// Waits for `command`, but not for ever, and asserts that it did not panic.
@@ -94,7 +102,7 @@ fn finish(command: &mut Command) -> Said {
                 child.kill().unwrap();
                 panic!("{command:?} hangs");
             }
-            None => std::thread::sleep(Duration::from_millis(5)),
+            None => std::thread::sleep(Duration::from_millis(1)),
         }
     };
     let text = |name: &str| String::from_utf8_lossy(&fs::read(logs.path().join(name)).unwrap()).into_owned();
@@ -135,6 +143,11 @@ impl Job {
     /// Lets a program with the feature `fault-injection` believe that it has so many processors.
     pub(crate) fn processors(self, processors: usize) -> Job {
         self.variable("GDT_PROCESSORS", &processors.to_string())
+    }
+
+    /// Lets the program draw a preview of the usual size.
+    pub(crate) fn usual_preview(self) -> Job {
+        self.variable(USUAL_PREVIEW.0, USUAL_PREVIEW.1)
     }
 
     /// Sets a variable of the program's environment.

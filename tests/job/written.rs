@@ -94,7 +94,7 @@ fn terrain_glb_holds_the_mesh_of_all_tiles() {
 fn the_georeference_agrees_with_the_cloud() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &clouds::grid(30, 20));
-    let job = Job::on(&[&cloud]);
+    let job = Job::on(&[&cloud]).usual_preview();
     job.report();
     let text = fs::read(job.out().join("georeference.json")).unwrap();
     let georeference: Value = serde_json::from_slice(&text).unwrap();

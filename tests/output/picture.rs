@@ -17,7 +17,7 @@ use crate::random::Random;
 
 fn canvas_of(frame: &Frame, mesh: &Tile) -> Canvas {
     let bounds = mesh.bounds().unwrap();
-    Canvas::new(frame, bounds, HeightRange::of(bounds))
+    Canvas::new(frame, bounds, HeightRange::of(bounds), LONGER_SIDE)
 }
 
 #[test]

@@ -10,7 +10,8 @@ use crate::scattered;
 fn limited(rig: &Rig, kibibytes: u64) -> Run {
     let mut command = Command::new("bash");
     command.arg("-c").arg(format!("ulimit -f {kibibytes} && exec \"$0\" --force job.toml"));
-    Run::start(command.arg(env!("CARGO_BIN_EXE_gdt-batch")).current_dir(rig.folder.path()))
+    command.arg(env!("CARGO_BIN_EXE_gdt-batch")).current_dir(rig.folder.path()).envs(rig.environment());
+    Run::start(&mut command)
 }
 
 /// Returns where a run stopped: the file that it could not write, without its number, and how many phases it kept.
@@ -23,7 +24,8 @@ fn place(said: &str) -> (String, String) {
 
 #[test]
 fn a_job_that_reached_a_file_size_limit_at_any_stage_goes_on_without_it() {
-    let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000));
+    let setup = Setup::tiles_of(2_000);
+    let rig = Rig::new(&scattered::gaussian(20_000), &setup).with_usual_preview(&setup);
     let mut places = BTreeSet::new();
     for count in [0, 1, 2, 3, 4] {
         for kibibytes in [24, 300, 600, 1_000] {
@@ -55,7 +57,7 @@ exit $code
 fn mounting(rig: &Rig, kibibytes: u64) -> Command {
     let mut command = Command::new("unshare");
     command.args(["--user", "--map-root-user", "--mount", "bash", "-c", FILL, env!("CARGO_BIN_EXE_gdt-batch")]);
-    command.arg(kibibytes.to_string()).current_dir(rig.folder.path());
+    command.arg(kibibytes.to_string()).current_dir(rig.folder.path()).envs(rig.environment());
     command
 }
 
@@ -76,7 +78,7 @@ fn after_a_job_that_filled_the_disk_another_one_runs_in_its_directory() {
         return;
     }
     let setup = Setup::tiles_of(20_000);
-    let mut rig = Rig::new(&scattered::gaussian(2_000), &setup);
+    let mut rig = Rig::new(&scattered::gaussian(2_000), &setup).with_usual_preview(&setup);
     for (name, points) in [("small", 5_000), ("large", 400_000), ("medium", 20_000)] {
         scattered::write(rig.folder.path(), &format!("{name}.csv"), &scattered::gaussian(points));
         let input = format!("files = [\"{name}.csv\"]");
@@ -91,8 +93,8 @@ fn after_a_job_that_filled_the_disk_another_one_runs_in_its_directory() {
         std::fs::create_dir(rig.out()).unwrap();
         let mut command = Command::new("unshare");
         command.args(["--user", "--map-root-user", "--mount", "bash", "-c", FILL_AND_GO_ON]);
-        let command = command.arg(env!("CARGO_BIN_EXE_gdt-batch")).arg(flag).current_dir(rig.folder.path());
-        let end = Run::start(command).end();
+        command.arg(env!("CARGO_BIN_EXE_gdt-batch")).arg(flag).current_dir(rig.folder.path()).envs(rig.environment());
+        let end = Run::start(&mut command).end();
         assert!(end.status.success() && end.out.contains("No space left"), "{end:?}");
         std::fs::remove_dir(rig.out()).unwrap();
         std::fs::rename(rig.folder.path().join("copy"), rig.out()).unwrap();
@@ -109,7 +111,8 @@ fn can_mount() -> bool {
 
 #[test]
 fn a_job_whose_disk_was_full_at_any_stage_goes_on_when_there_is_room() {
-    let rig = Rig::new(&scattered::gaussian(20_000), &Setup::tiles_of(2_000));
+    let setup = Setup::tiles_of(2_000);
+    let rig = Rig::new(&scattered::gaussian(20_000), &setup).with_usual_preview(&setup);
     if !can_mount() {
         eprintln!("skipped: no file system can be mounted here");
         return;

@@ -140,7 +140,7 @@ fn a_job_that_frees_its_mesh_takes_fewer_bytes_of_disk() {
     let peaks = |setup: &Setup| {
         let rig = Rig::new(&scattered::gaussian(POINTS), setup);
         let (job, mut peaks) = (rig.out().join("job"), [0, 0]);
-        let mut run = Run::start(&mut rig.command());
+        let mut run = Run::start(rig.command().env("GDT_PREVIEW", "1024"));
         while run.child.try_wait().unwrap().is_none() {
             let now = temporary_bytes(&job);
             peaks = [peaks[0].max(now[0]), peaks[1].max(now[1])];

@@ -196,6 +196,15 @@ impl Rig {
         fs::write(self.folder.path().join("job.toml"), setup.text()).unwrap();
     }
 
+    /// Lets the job draw a preview of the usual size, as `tests/run` does not, and learns anew what it must write.
+    #[track_caller]
+    pub(crate) fn with_usual_preview(mut self, setup: &Setup) -> Rig {
+        fs::remove_dir_all(self.folder.path().join("undisturbed")).unwrap();
+        self.environment.push(("GDT_PREVIEW", "1024".into()));
+        self.expect(setup);
+        self
+    }
+
     /// Lets the job wait for the disk as often as one that has run for long.
     pub(crate) fn syncing(mut self) -> Rig {
         self.environment.push(("GDT_SYNC", "1".into()));
@@ -214,8 +223,13 @@ impl Rig {
     /// Returns the command that runs the program with these arguments beside the configuration.
     pub(crate) fn command_of(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
-        command.args(arguments).current_dir(self.folder.path()).envs(self.environment.iter().map(|(k, v)| (k, v)));
+        command.args(arguments).current_dir(self.folder.path()).envs(self.environment());
         command
+    }
+
+    /// Returns the variables that the program gets.
+    pub(crate) fn environment(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        self.environment.iter().map(|(name, value)| (*name, value.as_str()))
     }
 
     #[track_caller]

@@ -33,7 +33,7 @@ const EIO: i32 = 5;
 
 #[cfg(feature = "remote")]
 pub use injection::network_timeout;
-pub use injection::{is_due, is_signalled, mark, processors, syncs_always, traced};
+pub use injection::{is_due, is_signalled, mark, preview_side, processors, syncs_always, traced};
 
 #[cfg(feature = "fault-injection")]
 mod injection {
@@ -93,6 +93,11 @@ mod injection {
     /// Returns the number of processors if a test sets it (`GDT_PROCESSORS`).
     pub fn processors() -> Option<usize> {
         std::env::var("GDT_PROCESSORS").ok()?.parse().ok()
+    }
+
+    /// Returns the pixels along the longer side of a preview if a test sets them (`GDT_PREVIEW`).
+    pub fn preview_side() -> Option<u64> {
+        std::env::var("GDT_PREVIEW").ok()?.parse().ok().filter(|&side| side > 0)
     }
 
     /// The file in which all changes of files are written down (`GDT_TRACE`).
@@ -161,6 +166,12 @@ mod injection {
     /// The number that the system tells.
     #[inline(always)]
     pub fn processors() -> Option<usize> {
+        None
+    }
+
+    /// The usual number.
+    #[inline(always)]
+    pub fn preview_side() -> Option<u64> {
         None
     }
 

@@ -24,7 +24,7 @@ use tiles::Compression;
 use tiles::attributes::AttributeChoice;
 use tiles::color::HeightRange;
 use tiles::options::{ExportFormat, MaxEdge, OutputFormat, OutputOptions};
-use tiles::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
+use tiles::preview::canvas::{Canvas, PreviewPixel, longer_side};
 use tiles::raster::options::RasterCompression;
 use tiles::raster::products::RasterProduct;
 
@@ -159,11 +159,11 @@ fn border_bytes(points: u64, per_tile: u64, tiles: u64) -> u64 {
 /// Returns the most pixels of the preview: those of the box in the headers. What a filter leaves of the points may have any other.
 fn preview_pixels(plan: &Plan) -> u64 {
     if has_filter(plan) {
-        return LONGER_SIDE * LONGER_SIDE;
+        return longer_side() * longer_side();
     }
     let [[xmin, ymin], [xmax, ymax]] = [plan.extent.min, plan.extent.max];
     let bounds = plan.with_lines(Bounds { min: [xmin, ymin, 0], max: [xmax, ymax, 0] });
-    let size = Canvas::new(&plan.frame, bounds, HeightRange { low: 0, high: 0 }).size();
+    let size = Canvas::new(&plan.frame, bounds, HeightRange { low: 0, high: 0 }, longer_side()).size();
     size.map(u64::from).iter().product()
 }
 

@@ -12,10 +12,15 @@ pub use crate::preview::pixel::PreviewPixel;
 use crate::preview::shading::Shading;
 use crate::tile::Tile;
 use delaunay::geometry::Bounds;
-use sys::{Result, interrupt};
+use sys::{Result, fault, interrupt};
 
 /// Pixels along the longer side of the preview.
 pub const LONGER_SIDE: u64 = 1024;
+
+/// Returns the pixels along the longer side of a job's preview: [`LONGER_SIDE`], unless a test sets another number.
+pub fn longer_side() -> u64 {
+    fault::preview_side().unwrap_or(LONGER_SIDE)
+}
 
 /// Lattice steps are halved until the longer side has at least this many subdivisions.
 const LEAST_SPAN: i64 = 1 << 20;
@@ -28,6 +33,8 @@ pub struct Canvas {
     corner: [i64; 2],
     /// What the ramp spans that colours tiles without colours.
     heights: HeightRange,
+    /// The pixels that the longer side may have.
+    longer_side: u64,
     /// The width in pixels.
     width: u32,
     /// The height in pixels.
@@ -44,17 +51,19 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// Returns the canvas for sites within `bounds`. Tiles without colours get those of a ramp over `heights`.
-    pub fn new(frame: &Frame, bounds: Bounds<3>, heights: HeightRange) -> Canvas {
+    /// Returns the canvas for sites within `bounds`, with `longer_side` pixels along its longer side. Tiles without colours get those of
+    /// a ramp over `heights`.
+    pub fn new(frame: &Frame, bounds: Bounds<3>, heights: HeightRange, longer_side: u64) -> Canvas {
         let span = [bounds.extent(0), bounds.extent(1)];
         let longer = span[0].max(span[1]).max(1);
         let shift = (1..).find(|&shift| longer << shift >= LEAST_SPAN).unwrap_or(1);
-        let pitch = 2 * ((longer << shift) as u64).div_ceil(2 * LONGER_SIDE) as i64;
+        let pitch = 2 * ((longer << shift) as u64).div_ceil(2 * longer_side) as i64;
         let [width, height] = span.map(|s| ((s << shift) + pitch - 1).div_euclid(pitch).max(1) as u32);
         Canvas {
             frame: frame.clone(),
             corner: [bounds.min[0] as i64, bounds.max[1] as i64],
             heights,
+            longer_side,
             width,
             height,
             shift,
@@ -68,6 +77,11 @@ impl Canvas {
     #[inline]
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
+    }
+
+    /// Returns the pixels that the longer side may have.
+    pub(super) fn longer_side(&self) -> u64 {
+        self.longer_side
     }
 
     /// Returns the way from the lattice to the source.

@@ -1,6 +1,6 @@
 //! Puts the pixels of all tiles together, shades them and writes the PNG.
 
-use crate::preview::canvas::{Canvas, LONGER_SIDE, PreviewPixel};
+use crate::preview::canvas::{Canvas, PreviewPixel};
 use crate::preview::layout::Layout;
 use crate::preview::panel::Legend;
 use rayon::prelude::*;
@@ -28,6 +28,8 @@ const DIRECT: f32 = 0.65;
 /// The picture of a terrain. It is transparent where there is no triangle.
 pub struct Picture {
     size: [usize; 2],
+    /// The pixels that the longer side may have.
+    longer_side: u64,
     pixels: Vec<PreviewPixel>,
     /// Whether a pixel has a triangle.
     covered: Vec<bool>,
@@ -44,6 +46,7 @@ impl Picture {
         let empty: PreviewPixel = bytemuck::Zeroable::zeroed();
         Picture {
             size,
+            longer_side: canvas.longer_side(),
             pixels: vec![empty; size[0] * size[1]],
             covered: vec![false; size[0] * size[1]],
             count: 0,
@@ -79,7 +82,7 @@ impl Picture {
         if self.covered[at] {
             return Some(self.pixels[at]);
         }
-        self.dots.get(&at).copied().filter(|_| self.count < LONGER_SIDE)
+        self.dots.get(&at).copied().filter(|_| self.count < self.longer_side)
     }
 
     /// Returns the picture with the strip of its legend below as a PNG file.

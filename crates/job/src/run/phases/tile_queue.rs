@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use sys::{Result, fault, interrupt};
 use tiles::color::HeightRange;
-use tiles::preview::canvas::Canvas;
+use tiles::preview::canvas::{Canvas, longer_side};
 
 /// Finishes and writes tiles. Any thread may call its methods.
 pub(crate) struct TileQueue<'a> {
@@ -67,7 +67,7 @@ impl TileAppearance {
     pub(crate) fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> Result<TileAppearance> {
         let heights = plan.heights.unwrap_or(HeightRange::of(bounds));
         let style = TileStyle::new(plan, max_rgb, bounds, heights, max_edge)?;
-        let canvas = Canvas::new(&style.frame, bounds, heights);
+        let canvas = Canvas::new(&style.frame, bounds, heights, longer_side());
         Ok(TileAppearance { style, canvas })
     }
 }
