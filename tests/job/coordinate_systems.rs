@@ -111,7 +111,7 @@ fn the_cure_of_a_geocentric_system_is_one_that_helps() {
     }
     // The user states a CRS already, or the other file does.
     let full = "the record is ignored";
-    let short = "its geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored, because [input] names another";
+    let short = "its geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored, because [input] sets another";
     for (files, line, words) in [
         (vec![&false_record], "crs = \"EPSG:26915\"", [short, full]),
         (vec![&false_record, &bare], "missing_crs = \"EPSG:26915\"", [short, full]),
@@ -426,7 +426,7 @@ fn a_map_that_is_not_computed_is_not_placed_and_is_named() {
     ] {
         let job = table_job(folder.path(), code, place);
         let said = warnings(&job.report());
-        assert!(said.contains(&format!("not placed on the globe: this program does not compute {what}")), "{said}");
+        assert!(said.contains(&format!("not placed on the globe: gdt-batch does not support {what}")), "{said}");
         assert!(said.contains("pdal translate"), "{said}");
         job.verified();
         let tileset: Value = serde_json::from_slice(&fs::read(job.out().join("tileset.json")).unwrap()).unwrap();
@@ -477,7 +477,7 @@ fn northings_that_are_as_great_as_the_radius_of_the_earth_are_no_geocentric_coor
     [131, 139].into_iter().for_each(|at| bytes[at..at + 8].copy_from_slice(&0.1f64.to_le_bytes()));
     fs::write(&file, bytes).unwrap();
     let said = warnings(&Job::on(&[&file]).report());
-    assert!(said.contains("is geocentric, but its points would stand upright near the equator"), "{said}");
+    assert!(said.contains("is geocentric, but its points would be vertical near the equator"), "{said}");
 }
 
 #[test]
@@ -496,7 +496,7 @@ fn a_file_without_a_system_whose_coordinates_look_like_degrees_is_named() {
             write(&mut bytes, 187 + 16 * axis, place - half);
         }
         fs::write(&file, bytes).unwrap();
-        let words = "look like longitude and latitude, but are taken as lengths";
+        let words = "look like longitude and latitude, but are treated as lengths";
         let job = |line: &str| Job::on(&[&file]).with("input", line);
         assert!(warnings(&job("").report()).contains(words), "{name}");
         assert!(!warnings(&job("crs = \"none\"").report()).contains(words), "{name}");

@@ -172,8 +172,9 @@ fn configurations_of_real_clouds_run_as_they_are_and_say_what_they_are() {
 
         let flat = configuration.replace("\n# ", " ");
         let has_heights = expected.unit == NO_UNIT || expected.unit.ends_with(" in z");
-        assert_eq!(flat.contains("nothing says the unit of z"), !has_heights, "{what}");
-        let unit = if expected.unit == NO_UNIT { "Unit: no file says it" } else { &format!("Unit: {}", expected.unit) };
+        assert_eq!(flat.contains("the unit of z is unknown"), !has_heights, "{what}");
+        let unit =
+            if expected.unit == NO_UNIT { "Unit: no file states it" } else { &format!("Unit: {}", expected.unit) };
         assert!(text(&new["unit"]).contains(expected.unit) && flat.contains(unit), "{} {what}", new["unit"]);
         let place = fs::read(folder.path().join("out/georeference.json")).unwrap();
         let place: Value = serde_json::from_slice(&place).unwrap();
@@ -329,7 +330,7 @@ fn a_configuration_is_replaced_only_if_that_is_asked_for() {
     fs::write(&path, "mine").unwrap();
     for arguments in [&["clouds"][..], &["clouds", "--force"]] {
         let said = init(folder.path(), arguments);
-        said.refused(2, &["job.toml exists already and is no configuration"]);
+        said.refused(2, &["job.toml exists already and is not a configuration"]);
         assert!(!said.err.contains("--force") && fs::read_to_string(&path).unwrap() == "mine", "{said:?}");
     }
     let cloud = fs::read(folder.path().join("clouds/a.laz")).unwrap();
@@ -340,7 +341,7 @@ fn a_configuration_is_replaced_only_if_that_is_asked_for() {
     init(folder.path(), &["clouds", "--force"]).succeeded();
     assert!(fs::read_to_string(&path).unwrap().contains("clouds/a.laz"));
     init(folder.path(), &["clouds", "--output", "clouds"]).refused(2, &["no regular file"]);
-    init(folder.path(), &["clouds", "--output", "no/job.toml"]).refused(2, &["make it first"]);
+    init(folder.path(), &["clouds", "--output", "no/job.toml"]).refused(2, &["create it first"]);
     init(folder.path(), &["nothing.laz"]).refused(2, &["exists already"]);
     init(folder.path(), &["nothing.laz", "-o", "-"]).refused(2, &["there is no file nothing.laz"]);
     init(folder.path(), &["-o", "-"]).refused(2, &["has no point clouds", "clouds, which has some"]);

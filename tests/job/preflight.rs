@@ -27,7 +27,7 @@ fn a_job_refused_for_disk_or_memory_may_be_retried_and_one_below_a_file_not() {
         (
             Preflight { disk_free: Some(need - 1), ..preflight.clone() },
             ErrorKind::Retry,
-            ["make room or choose another", "--force"],
+            ["free some space or choose another", "--force"],
         ),
         (
             Preflight { memory_free: Some(1 << 20), ..preflight.clone() },

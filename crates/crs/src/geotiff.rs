@@ -54,15 +54,15 @@ pub(crate) fn problems(keys: &GeoKeys) -> Vec<String> {
     let of_code = || keys.code(GEOGRAPHIC_TYPE).and_then(|code| text_of_code(code.into()));
     let problem = match projected(keys) {
         Some(USER_DEFINED) => geotiff_text::problem(keys)
-            .or_else(|| Some("the GeoTIFF keys do not say its projection or its datum".into())),
+            .or_else(|| Some("the GeoTIFF keys do not define its projection or its datum".into())),
         None if is_geographic => geotiff_text::problem_of_angles(keys, of_code()).or_else(|| {
             let code = keys.code(GEOGRAPHIC_TYPE).filter(|code| *code != USER_DEFINED);
-            Some(code.map_or_else(|| "the GeoTIFF keys do not say its datum".into(), not_in_list))
+            Some(code.map_or_else(|| "the GeoTIFF keys do not define its datum".into(), not_in_list))
         }),
         code => code.map(not_in_list),
     };
     let projection = problem.filter(|_| is_unknown);
-    let projection = projection.map(|what| format!("nobody can tell where its coordinates are: {what}"));
+    let projection = projection.map(|what| format!("the place of its coordinates is unknown: {what}"));
     unit.into_iter().chain(height).chain(projection).chain(other_unit(keys)).collect()
 }
 

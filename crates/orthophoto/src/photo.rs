@@ -43,13 +43,13 @@ impl Orthophoto {
         require_file(path)?;
         let file = File::open(path).map_err(Error::io("read", path))?;
         let read = catch_panic(|| Orthophoto::read(path, file, points, most_bytes));
-        let read = read.map_err(|e| bad_photo(path, format!("it is no GeoTIFF that can be read: {e}")))?;
+        let read = read.map_err(|e| bad_photo(path, format!("it is not a readable GeoTIFF: {e}")))?;
         read.map_err(|what| bad_photo(path, what))
     }
 
     fn read(path: &Path, file: File, points: &Crs, most_bytes: u64) -> std::result::Result<Orthophoto, String> {
         let other = file.try_clone().map_err(|e| e.to_string())?;
-        let not_read = |e: tiff::TiffError| format!("it is no GeoTIFF that can be read: {e}");
+        let not_read = |e: tiff::TiffError| format!("it is not a readable GeoTIFF: {e}");
         let mut image = Decoder::new(BufReader::new(other)).map_err(not_read)?;
         let bands = Bands::of(&mut image)?;
         let pixels = PixelGrid::of(&mut image)?;

@@ -340,7 +340,7 @@ impl<'a> Inputs<'a> {
             && self.facts.input.is_some()
         {
             failures.push(format!(
-                "{} points of the inputs are no vertices, where report.json says that {dropped} were dropped at breaklines",
+                "{} points of the inputs are not vertices, but by report.json {dropped} were dropped at breaklines",
                 differences.dropped
             ));
         }
@@ -356,7 +356,7 @@ impl<'a> Inputs<'a> {
             }
         }
         let unproved = self.facts.input.is_none().then(|| {
-            "points may be missing: there is no report.json that says which points of the inputs the job wanted"
+            "points may be missing: there is no report.json to show which points of the inputs the job selected"
                 .to_owned()
         });
         let no_bound = || "the max_error in report.json is no bound on this lattice".to_owned();
@@ -515,7 +515,7 @@ impl Differences<'_> {
             )
         });
         let too_many = (excused > dropped).then(|| {
-            format!("{excused} points beyond max_error lie at breaklines, where report.json says that {dropped} were dropped there")
+            format!("{excused} points beyond max_error lie at breaklines, where {dropped} points were dropped by report.json")
         });
         let sentences: Vec<String> = too_far.into_iter().chain(outside()).chain(too_many).collect();
         (!sentences.is_empty()).then(|| sentences.join("; "))

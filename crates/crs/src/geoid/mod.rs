@@ -88,7 +88,7 @@ impl Geoid {
 pub fn require_file(path: &Path) -> Result<(), Error> {
     match path.metadata().map_err(|e| not_opened(path, e))?.is_file() {
         true => Ok(()),
-        false => Err(bad_file(path, "it is no file; name a geoid grid (.gtx or .tif)")),
+        false => Err(bad_file(path, "it is not a file; name a geoid grid (.gtx or .tif)")),
     }
 }
 

@@ -258,7 +258,7 @@ fn geotiffs_of_another_kind_are_refused_by_name() {
     refused_with(opened("a.tif", &bytes.into_inner()), &["32-bit floating point"]);
     let mut bytes = Cursor::new(Vec::new());
     TiffEncoder::new(&mut bytes).unwrap().write_image::<Gray32Float>(5, 4, &[0.0; 20]).unwrap();
-    refused_with(opened("a.tif", &bytes.into_inner()), &["does not say where it is"]);
+    refused_with(opened("a.tif", &bytes.into_inner()), &["is not georeferenced"]);
 }
 
 #[test]

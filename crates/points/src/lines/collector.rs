@@ -223,7 +223,8 @@ impl<'a> FeatureCollector<'a> {
         let kind = value.as_deref().and_then(kind_of_name);
         kind.map(Some).ok_or_else(|| {
             let value = value.map_or("nothing".into(), |value| format!("{value:?}"));
-            let what = format!("has {value} in {name:?}, not line, river or lake: say with kinds what the values mean");
+            let what =
+                format!("has {value} in {name:?}, not line, river or lake: use kinds to map its values to these");
             self.refuse(number, what)
         })
     }

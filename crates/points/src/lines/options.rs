@@ -78,7 +78,7 @@ impl LinePurpose {
     /// Returns what to do about the file at `path` if it states no CRS that can be used.
     pub fn remedy_of_crs(self, path: &Path) -> String {
         match self {
-            LinePurpose::Breaklines => "say with crs in [[breaklines]] what the lines are in".into(),
+            LinePurpose::Breaklines => "set crs in [[breaklines]] to the CRS of the lines".into(),
             LinePurpose::Clip | LinePurpose::Places => {
                 format!(
                     "write the right one into it, for example with `ogr2ogr -a_srs EPSG:26915 corrected.gpkg {}`",
