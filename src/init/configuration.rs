@@ -59,7 +59,7 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
 fn head(page: &mut Page, name: Option<&str>) {
     page.say(&format!("{FIRST_WORDS}, written by the program."));
     if let Some(name) = name {
-        page.show(&format!("gdt-batch check {name}"), "says what it would do");
+        page.show(&format!("gdt-batch check {name}"), "shows what it would do");
         page.show(&format!("gdt-batch {name}"), "runs it");
     }
     page.say("To enable an option, delete the # in front of it.");

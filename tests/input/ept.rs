@@ -121,13 +121,13 @@ fn an_index_that_cannot_be_used_is_refused() {
     for (from, to, words) in [
         ("\"laszip\"", "\"draco\"", "nodes of the type \"draco\""),
         ("\"json\"", "\"gz\"", "a hierarchy of the type \"gz\""),
-        ("\"points\":10000", "\"points\":9999", "says it has 9999 points, but the nodes of its hierarchy have 10000"),
+        ("\"points\":10000", "\"points\":9999", "claims 9999 points, but the nodes of its hierarchy have 10000"),
         ("\"points\":10000", "\"points\":-1", "is not a readable EPT index"),
         ("\"name\":\"Y\"", "\"name\":\"y\"", "has no dimension Y"),
         ("\"type\":\"signed\"", "\"type\":\"floating\"", "has X as floating numbers without a scale"),
         ("\"scale\":0.01", "\"scale\":0", "as the scale of x"),
         ("\"scale\":0.01", "\"scale\":0.001", "this node has another scale or offset than the index"),
-        ("\"bounds\":[", "\"bounds\":[1e9, 1e9, 1e9, 0, 0, 0], \"other\":[", "no cube"),
+        ("\"bounds\":[", "\"bounds\":[1e9, 1e9, 1e9, 0, 0, 0], \"other\":[", "not a cube"),
     ] {
         let error = error_of(NodeType::Laszip, ALL, |files| files.edit("ept.json", replaced(from, to)));
         assert!(error.contains(words), "{words}: {error}");

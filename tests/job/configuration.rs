@@ -200,7 +200,7 @@ fn anything_in_the_way_of_the_output_is_named() {
     // A file that no job wrote, in the place of the report.
     fs::write(there("out/report.json"), "theirs").unwrap();
     for arguments in [&["job.toml"][..], &["check", "job.toml"]] {
-        gdt_batch(folder.path(), arguments).refused(2, &["out/report.json", "would overwrite", "move it away"]);
+        gdt_batch(folder.path(), arguments).refused(2, &["out/report.json", "would be overwritten", "move it away"]);
     }
     fs::remove_file(there("out/report.json")).unwrap();
     gdt_batch(folder.path(), &["job.toml"]).succeeded();

@@ -163,7 +163,10 @@ fn the_unit_of_a_false_record_gives_way_to_every_other_statement() {
     let said = warnings(&Job::on(&[&silent]).report());
     assert!(said.contains("no input states a known unit of length: metres assumed; fix: set [input] unit"), "{said}");
     let said = warnings(&Job::on(&[&in_metres]).report());
-    assert!(said.contains("x and y are a plane in metre") && !said.contains("no input states a known unit"), "{said}");
+    assert!(
+        said.contains("x and y are treated as a plane in metre") && !said.contains("no input states a known unit"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -186,7 +189,7 @@ fn geocentric_coordinates_are_refused_by_code_text_and_keys() {
         assert_eq!((unplaced["unit"].as_str(), unplaced["crs"].as_str()), (Some("us-foot"), None));
         assert_eq!(Job::on(&[&file]).report()["unit"], "metre");
         move_to(&file, [4_177_000.0, 855_000.0, 4_728_000.0]);
-        let words = ["geocentric", "z is no height", "pdal translate", "[input] crs"];
+        let words = ["geocentric", "z is not a height", "pdal translate", "[input] crs"];
         Job::on(&[&file]).run().refused(2, &words);
         Job::on(&[&file]).with("input", "unit = \"metre\"").run().refused(2, &words);
         Job::on(&[&file]).with("input", "crs = \"none\"").report();
@@ -323,7 +326,7 @@ fn a_projection_without_its_origin_is_not_placed_and_is_named() {
     }
     let file = write(folder.path(), "plain.las", &[]);
     let given = Job::on(&[&file]).with("input", &format!("crs = '''{lost}'''")).report();
-    assert!(warnings(&given).contains("[input] crs (UTM_15N): nobody can tell"), "{given}");
+    assert!(warnings(&given).contains("[input] crs (UTM_15N): the place of its coordinates is unknown"), "{given}");
 }
 
 #[test]

@@ -171,7 +171,7 @@ fn what_the_user_says_is_not_called_a_record() {
     let file = write(folder.path(), "plain.las", &[]);
     for (choice, word) in [("EPSG:4326", "degrees"), ("EPSG:4978", "geocentric")] {
         let said = Job::on(&[&file]).with("input", &format!("crs = \"{choice}\"")).run();
-        said.refused(2, &[word, "in another CRS than [input] crs says"]);
+        said.refused(2, &[word, "in another CRS than [input] crs"]);
         assert!(!said.err.contains("record is wrong"), "{said:?}");
     }
     let degrees = write(folder.path(), "degrees.las", &[keys(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]])]);

@@ -100,7 +100,7 @@ fn an_interrupted_job_notices_a_list_that_has_changed() {
     };
     let job = interrupted();
     fs::write(&text, "# the same files\nclouds/a.csv\nclouds/b.csv\n").unwrap();
-    assert!(job.run().succeeded().err.contains("going on"));
+    assert!(job.run().succeeded().err.contains("continuing"));
     let job = interrupted();
     fs::write(&text, "clouds/a.csv\nclouds/b.csv\nclouds/c.csv\n").unwrap();
     let said = job.run().succeeded();

@@ -207,7 +207,7 @@ fn a_vertex_raised_by_a_thousand_metres_is_found() {
 fn a_vertex_moved_by_one_step_is_found() {
     // The coordinates of the cloud are whole numbers.
     let nudge = |out: &Path| vec![move_vertex(out, 0, 1.0)];
-    only_the_inputs_find_a_perfect_forgery(nudge, "the vertices are not those of the job", "1 vertices are no points");
+    only_the_inputs_find_a_perfect_forgery(nudge, "the vertices are not those of the job", "1 vertices are not points");
 }
 
 #[test]
@@ -216,7 +216,7 @@ fn an_offset_shifted_in_all_tiles_is_found() {
         shift_all_tiles(out);
         files(out, "").into_keys().filter(|name| name.ends_with(".glb")).collect()
     };
-    only_the_inputs_find_a_perfect_forgery(shift, "where report.json says", "vertices are no points of the inputs");
+    only_the_inputs_find_a_perfect_forgery(shift, "where report.json says", "vertices are not points of the inputs");
 }
 
 /// Runs `verify` and asserts the exit code and the last line, with and without `--quiet`.
@@ -401,7 +401,7 @@ fn the_inputs_prove_the_vertices_whatever_the_job_wanted_of_them() {
         said.refused(4, &["not the Delaunay triangulation of the inputs' points"]);
         let failures = said.json()["failures"].to_string();
         assert!(
-            failures.contains("vertices are no points of the inputs") && failures.contains("fingerprint"),
+            failures.contains("vertices are not points of the inputs") && failures.contains("fingerprint"),
             "{failures}"
         );
     }
@@ -409,7 +409,7 @@ fn the_inputs_prove_the_vertices_whatever_the_job_wanted_of_them() {
     let job = Job::on(&[&second]);
     job.report();
     let said = gdt_batch(job.folder(), &["verify", "out", "--input", &second, &first]);
-    said.refused(4, &["points of the inputs are no vertices", "record", "first.csv"]);
+    said.refused(4, &["points of the inputs are not vertices", "record", "first.csv"]);
 }
 
 #[test]

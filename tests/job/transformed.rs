@@ -210,7 +210,7 @@ fn shifts_of_datums_and_heights_are_refused_by_name() {
     to(&new, "to_crs = \"EPSG:32615\"").run().refused(2, &["NAD83", "WGS 84", "datums = \"close\""]);
     let close = to(&new, "to_crs = \"EPSG:32615\"\ndatums = \"close\"").report();
     assert!(warnings(&close).contains("no datum shift between NAD83 and WGS 84"), "{close}");
-    to(&new, "to_crs = \"EPSG:4326\"").run().refused(2, &["to_crs", "no map"]);
+    to(&new, "to_crs = \"EPSG:4326\"").run().refused(2, &["to_crs", "not a map"]);
     to(&new, "to_crs = \"EPSG:5513\"\ncrs = \"EPSG:4156\"").run().refused(2, &["Krovak"]);
     let heights = |name: &str| {
         let plane = crs("EPSG:26916").wkt.unwrap();

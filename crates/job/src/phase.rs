@@ -127,7 +127,11 @@ impl Task {
                 let count = match (count, first) {
                     (Some(count), _) => count,
                     (None, 1) => slurm_count(&variable)?,
-                    _ => return Err(Error::Config(format!("{name} is {text}, but of how many tasks? Add --tasks N"))),
+                    _ => {
+                        return Err(Error::Config(format!(
+                            "{name} is {text}, but the number of tasks is missing: add --tasks N"
+                        )));
+                    }
                 };
                 let text = format!("{name} is {text}, and there are {count} tasks: their numbers begin at {first}");
                 return number

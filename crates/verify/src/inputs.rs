@@ -481,9 +481,9 @@ impl Differences<'_> {
         let sentence = |(kind, difference): (usize, &Difference)| {
             let (count, [a, b]) = (difference.count, difference.first?);
             Some(match kind {
-                NO_POINT => format!("{count} vertices are no points of the inputs, the first at {}", self.text(a)),
+                NO_POINT => format!("{count} vertices are not points of the inputs, the first at {}", self.text(a)),
                 NO_VERTEX => {
-                    format!("{count} points of the inputs are no vertices, the first is {}", self.record_text(b))
+                    format!("{count} points of the inputs are not vertices, the first is {}", self.record_text(b))
                 }
                 _ => format!(
                     "{count} vertices have another height than the points of the inputs, the first at {}: it should be that of {}{}",

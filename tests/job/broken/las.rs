@@ -81,7 +81,7 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
                 "64-bit count too large",
                 247,
                 201u64.to_le_bytes().to_vec(),
-                Refused(3, "holds 201 records, but 1 is missing"),
+                Refused(3, "claims 201 records, but 1 is missing"),
             ),
             ("64-bit count too small", 247, 150u64.to_le_bytes().to_vec(), Read(150, 0, "")),
             ("two counts", 107, vec![0xff; 4], Read(COUNT, 0, "two point counts")),
@@ -90,8 +90,8 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
         ]);
     } else {
         fields.extend([
-            ("count", 107, vec![0xff; 4], Refused(3, "holds 4294967295 records")),
-            ("count too large", 107, 201u32.to_le_bytes().to_vec(), Refused(3, "holds 201 records, but 1 is missing")),
+            ("count", 107, vec![0xff; 4], Refused(3, "claims 4294967295 records")),
+            ("count too large", 107, 201u32.to_le_bytes().to_vec(), Refused(3, "claims 201 records, but 1 is missing")),
             ("count too small", 107, 150u32.to_le_bytes().to_vec(), Read(150, 0, "")),
             ("no count", 107, vec![0; 4], Refused(3, "no point is left")),
         ]);

@@ -56,7 +56,7 @@ impl Geoid {
         grid.interpolate(longitude, latitude, &**values)?.ok_or_else(|| {
             let (why, remedy) = match grid.covers(longitude, latitude) {
                 true => (
-                    ": it covers the place, but a node beside it has NaN, the value for no height, or more than a kilometre".into(),
+                    ": it covers the place, but a neighbouring node has NaN, the value for no height, or more than a kilometre".into(),
                     "repair the grid, or take another one",
                 ),
                 false => (grid.extent(), "take a grid that covers the terrain"),

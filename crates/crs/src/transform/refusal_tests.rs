@@ -115,7 +115,7 @@ fn what_web_mercator_does_not_have_is_not_dropped() {
         r#"["Mercator_Auxiliary_Sphere"],PARAMETER["Auxiliary_Sphere_Type",2]"#,
         r#"["Mercator_Auxiliary_Sphere"],PARAMETER["Standard_Parallel_1",40]"#,
     ] {
-        assert!(refused(&mercator(odd, ""), &wgs84).contains("is not known here"), "{odd}");
+        assert!(refused(&mercator(odd, ""), &wgs84).contains("is unknown"), "{odd}");
     }
     let extended = |words: &str| {
         let extension = format!(

@@ -353,7 +353,7 @@ mod tests {
         assert!(southings.contains("S-JTSK / Krovak") && southings.contains("pdal translate"), "{southings}");
         assert!(refused(27200, "+proj=nzmg").contains("New_Zealand_Map_Grid"));
         let british = "+proj=tmerc +nadgrids=OSTN15.gsb";
-        assert!(refused(27700, british).contains(&format!("the datum of {british} to WGS 84 needs a grid")));
+        assert!(refused(27700, british).contains(&format!("the datum shift from {british} to WGS 84 needs a grid")));
         let old = refused(26715, "+proj=utm +zone=15 +datum=NAD27 +units=m +no_defs");
         assert!(old.contains("needs a grid") && old.contains("NAD27") && old.contains("NAD83"), "{old}");
         assert!(refused(27700, "+proj=tmerc +towgs84=1,2").contains("cannot be read"));

@@ -316,7 +316,7 @@ pub fn horizontal_unit(
     };
     // What the user says is no record of a file.
     let what_to_do = match chosen {
-        CrsChoice::Given { .. } => "if the files are in another CRS than [input] crs says, name that one",
+        CrsChoice::Given { .. } => "if the files are in another CRS than [input] crs, name that one",
         _ => "if the CRS record is wrong, set [input] crs to the right one",
     };
     let unit = if choice == UnitChoice::Auto { crs.horizontal } else { choice.unit() };

@@ -47,7 +47,7 @@ fn said_by_user<'a>(key: &str, crs: &Crs, sources: impl Iterator<Item = &'a Sour
     Error::Config(match elsewhere.next() {
         Some(source) => format!(
             "[input] {key} is {label}, which is geocentric, but the points of {} do not lie on the surface of the earth (x from {} to {}, y \
-             from {} to {}, z from {} to {}). If they are in another CRS than [input] {key} says, {other}",
+             from {} to {}, z from {} to {}). If they are in another CRS than [input] {key}, {other}",
             source.path.display(),
             source.min[0],
             source.max[0],
@@ -58,7 +58,7 @@ fn said_by_user<'a>(key: &str, crs: &Crs, sources: impl Iterator<Item = &'a Sour
         ),
         None => format!(
             "the coordinates are geocentric ([input] {key} is {label}): their origin is the centre of the earth, and z is not a height. \
-             {TRANSFORM}; if the files are in another CRS than [input] {key} says, {other}"
+             {TRANSFORM}; if the files are in another CRS than [input] {key}, {other}"
         ),
     })
 }

@@ -54,7 +54,7 @@ impl LazCompression {
         let size: u64 = items.iter().map(|item| item.size() as u64).sum();
         if size != header.record_length as u64 {
             return Err(broken(format!(
-                "describes points of {size} bytes, while the header says {}",
+                "describes points of {size} bytes, but the header gives {}",
                 header.record_length
             )));
         }

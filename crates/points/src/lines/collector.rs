@@ -361,7 +361,8 @@ impl<'a> FeatureCollector<'a> {
         if !line.iter().any(has_height) {
             return Err(self.refuse(
                 number,
-                "has no heights: a breakline takes x, y and z, and measures (M) are no heights. Give it heights (in QGIS: \"Drape\" with an elevation model), or name \
+                "has no heights: a breakline takes x, y and z, and measures (M) are not heights. Give it heights (in QGIS: \"Drape\" \
+                 with an elevation model), or name \
                  an attribute that has them with height_field, or set heights = \"points\" to take them from the points around",
             ));
         }

@@ -360,7 +360,7 @@ mod tests {
     #[test]
     fn what_is_broken_is_named() {
         for (text, word) in [
-            ("{\"type\": \"FeatureCollection\", \"features\": [", "is no GeoJSON"),
+            ("{\"type\": \"FeatureCollection\", \"features\": [", "is not readable GeoJSON"),
             ("{}", "missing field"),
             (r#"{"type": "Topology"}"#, "Topology"),
             (

@@ -394,6 +394,6 @@ mod tests {
         let next = r#"{"type": "FeatureCollection", "links": [{"rel": "next", "href": "l.json"}]}"#;
         assert!(error(&[("l.json", next)]).contains("which was before"));
         let post = next.replace(r#""href""#, r#""method": "POST", "href""#);
-        assert!(error(&[("l.json", &post)]).contains("by POST"));
+        assert!(error(&[("l.json", &post)]).contains("POST"));
     }
 }
