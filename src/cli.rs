@@ -12,14 +12,14 @@ use std::path::PathBuf;
 /// What `--help` shows after the options.
 const AFTER_HELP: &str = "\
 Examples:
-  gdt-batch sample cloud.laz            write a sample terrain to try things on
-  gdt-batch cloud.laz                   make a terrain of it, in cloud-terrain
-  gdt-batch tiles/ --surface ground     make bare earth of all point clouds in a folder, in tiles-terrain
+  gdt-batch sample cloud.laz            write a sample point cloud
+  gdt-batch cloud.laz                   make a terrain from it, in cloud-terrain
+  gdt-batch tiles/ --surface ground     make bare earth from all point clouds in a folder, in tiles-terrain
   gdt-batch init *.laz                  write job.toml, a configuration for these clouds
   gdt-batch job.toml                    run the job of a configuration
   gdt-batch check job.toml              show what the job would do, and whether it fits
   gdt-batch info --histogram a.laz      count the points of each class
-  gdt-batch view out                    look at the terrain in a browser
+  gdt-batch view out                    show the terrain in a browser
   gdt-batch verify out                  prove that the tiles in out are the exact Delaunay triangulation
   gdt-batch verify out --input *.laz    and that its vertices are the points of these files
   gdt-batch diff before after           compute cut and fill between two terrains
@@ -29,7 +29,7 @@ The shortest configuration:
   files = [\"clouds/*.laz\"]
   [output]
   directory = \"out\"
-`gdt-batch init` writes one with more options; the manual explains all in options.md.
+`gdt-batch init` writes one with more options. The manual explains all options in options.md.
 
 After an interruption, run the same command again: the job continues where it stopped.
 
@@ -53,7 +53,7 @@ pub struct Cli {
     /// Point clouds: files, folders, patterns such as "tiles/*.laz", URLs. Or the configuration of a job (TOML).
     #[arg(value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Compute only what has changed since the last run with this option, and keep what the next one needs. The first run computes all.
+    /// Compute only what has changed since the last run with --update. The first such run computes everything.
     #[arg(long, requires = "files")]
     pub update: bool,
     /// Start the job over instead of continuing an interrupted run.
@@ -62,7 +62,7 @@ pub struct Cli {
     /// The old name of `--restart`.
     #[arg(long, requires = "files", hide = true)]
     pub fresh: bool,
-    /// Run the job even if it does not seem to fit the disk or the memory. With --write-config, replace the configuration.
+    /// Run the job even if disk or memory seem too small. With --write-config, overwrite the configuration.
     #[arg(long, requires = "files")]
     pub force: bool,
     /// What to print.
@@ -105,7 +105,7 @@ pub struct PrintOptions {
     /// Print the result as JSON on standard output.
     #[arg(long, global = true)]
     pub json: bool,
-    /// How to show progress on standard error: json prints a line a second for programs.
+    /// How to show progress on standard error; json prints one JSON object a line, about once a second.
     #[arg(long, global = true, value_name = "HOW", default_value = "auto")]
     pub progress: ShownProgress,
 }
@@ -115,8 +115,9 @@ pub struct PrintOptions {
 pub enum CliCommand {
     /// Write a configuration for point clouds, with comments on what they contain.
     ///
-    /// Reads headers and a sample of the points, and all of a text. Sets what the job needs, such as to_crs for degrees, and says why in
-    /// a comment. If no configuration makes a job of the clouds, the message and the exit code are those of `check`.
+    /// Reads headers and a sample of the points, and text files completely. Sets the options that the job needs, such as to_crs for
+    /// degrees, and explains them in comments. If no configuration works for the clouds, it fails with the message and exit code of
+    /// `check`.
     Init {
         /// Point clouds: files, folders, patterns such as "clouds/*.laz", URLs. Default: the point clouds in the current folder.
         files: Vec<PathBuf>,
@@ -149,19 +150,19 @@ pub enum CliCommand {
     },
     /// Compute cut and fill between two terrains, exactly, over the area that both cover.
     ///
-    /// Overlays the triangles of both. Cut is what was removed: AFTER lies below BEFORE. Fill is what was added. Both must have the same
-    /// CRS, units and vertical datum. Results in metres, and in the units of the terrains. With --output, also writes difference.tif (AFTER
-    /// minus BEFORE, a GeoTIFF) and AFTER as 3D Tiles in colours, red for cut and blue for fill, which `gdt-batch view` shows.
+    /// Overlays the triangles of both. Cut is what was removed: AFTER lies below BEFORE. Fill is what was added. Both terrains must have
+    /// the same CRS, units and vertical datum. Results are in metres and in the units of the terrains. With --output, also writes
+    /// difference.tif (AFTER minus BEFORE, a GeoTIFF), and AFTER as coloured 3D Tiles (red for cut, blue for fill) for `gdt-batch view`.
     Diff(DiffOptions),
     /// Write the heights of a terrain along lines as CSV.
     ///
-    /// A row for each vertex of a line and each edge of the mesh that it crosses: line, distance, x, y, z, in units of the terrain. Outside of
-    /// the terrain z is empty. Where a line leaves the terrain there are two rows, the second without z.
+    /// Writes a row for each vertex of a line and for each edge of the mesh that it crosses: line, distance, x, y, z, in units of the
+    /// terrain. Outside the terrain, z is empty. Where a line leaves the terrain there are two rows, the second without z.
     Profile {
         /// The terrain: the output directory of a finished job, or its configuration.
         #[arg(value_hint = ValueHint::AnyPath)]
         terrain: PathBuf,
-        /// The lines: GeoJSON, GeoPackage or Shapefile, in the CRS of the terrain or in one that can be transformed into it.
+        /// The lines: GeoJSON, GeoPackage or Shapefile, in any CRS that can be transformed into that of the terrain.
         #[arg(value_hint = ValueHint::FilePath)]
         lines: PathBuf,
         /// The file to write; an existing CSV is overwritten. Default: standard output.
@@ -170,32 +171,31 @@ pub enum CliCommand {
     },
     /// Show the terrain in a browser.
     ///
-    /// Serves the results, and opens a page. Only browsers on this machine can reach it, unless --address is set. Ctrl-C ends it.
+    /// Starts a web server and opens a browser. Only this machine can connect, unless --address is set. Ctrl-C stops the server.
     View(ViewOptions),
     /// Run one task of a distributed job (called by the scheduler).
     ///
-    /// The tasks of all phases, on machines that share the output directory, do the job together. The results have the same bytes for any
-    /// number of tasks. Exit code 1: the task may be tried again; if an earlier phase is not complete, the message names its missing
-    /// tasks.
+    /// The tasks of all phases do the job together, on machines that share the output directory. The results are byte-identical for any
+    /// number of tasks. Exit code 1: the task may be retried. If an earlier phase is incomplete, the message names its missing tasks.
     Work {
         /// The configuration of the job.
         config: PathBuf,
-        /// The phase to work on.
+        /// The phase of the task.
         #[arg(long, value_enum)]
         phase: Phase,
         /// The task: number i, from 1 on, of N. Default: from the environment of an array job (Slurm, Kubernetes, AWS Batch).
         #[arg(long, value_name = "i/N")]
         task: Option<Task>,
-        /// The number of tasks of each phase, where the environment has only the number of this one.
+        /// The number of tasks in each phase, if the environment has only the index of this one.
         #[arg(long, value_name = "N", conflicts_with = "task", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: Option<u32>,
         /// Worker threads of this task, instead of `[limits] threads`.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
-        /// Plan the job even if it does not seem to fit the disk or the memory of this machine.
+        /// Plan the job even if disk or memory of this machine seem too small.
         #[arg(long)]
         force: bool,
-        /// The number of a submission that starts the job over, as `submit --restart` gives it.
+        /// The submission number of a job that is started over; set by `submit --restart`.
         #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
         submission: u64,
         /// Stop when standard input ends. The engine `local` holds its other end, so no task outlives the engine.
@@ -204,24 +204,24 @@ pub enum CliCommand {
     },
     /// Run a large job on many machines.
     ///
-    /// All machines must see the inputs, the configuration and the output directory under the same paths. Only missing
-    /// tasks are sent: after failures, run the same command again.
+    /// Inputs, configuration and output directory must have the same paths on all machines. Only missing tasks are submitted: after
+    /// failures, run the same command again.
     Submit {
         /// The configuration of the job.
         config: PathBuf,
-        /// The engine.
+        /// The scheduler.
         #[arg(long, value_enum)]
         engine: Engine,
-        /// The number of tasks of each phase. With `local`, at most as many run at once.
+        /// The number of tasks in each phase. With `local`, up to this many run at once.
         #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: u32,
-        /// Start the job over, also if it is done or under way.
+        /// Start the job over, even if it is done or in progress.
         #[arg(long)]
         restart: bool,
-        /// Send nothing, and print what would be sent.
+        /// Print what would be submitted, and submit nothing.
         #[arg(long)]
         dry_run: bool,
-        /// Options of the engine: with slurm those of sbatch; with kubernetes see `-- --help`.
+        /// Options for the scheduler: those of sbatch with slurm; `-- --help` lists those with kubernetes.
         #[arg(last = true, value_name = "ENGINE OPTIONS")]
         added: Vec<String>,
     },
@@ -229,7 +229,7 @@ pub enum CliCommand {
     Status {
         /// The configuration of the job.
         config: PathBuf,
-        /// The number of tasks of each phase: name missing tasks, not parts.
+        /// The number of tasks in each phase: lists missing tasks instead of missing parts.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
         tasks: Option<u32>,
     },
@@ -238,13 +238,13 @@ pub enum CliCommand {
         /// Point clouds: LAS, LAZ, COPC, EPT or text, folders, or lists of them.
         #[arg(required = true)]
         files: Vec<PathBuf>,
-        /// Read all points, and count those of each class and of each return.
+        /// Read all points, and count them by class and by return.
         #[arg(long)]
         histogram: bool,
     },
-    /// List the GPUs of this machine, test one, and measure how much faster a job is with it.
+    /// List the GPUs of this machine, test one, and measure its speed-up.
     Gpu {
-        /// Part of the name of the GPU to test. Default: the GPU that backend = "gpu" takes.
+        /// Part of the name of the GPU to test. Default: the GPU that backend = "gpu" uses.
         #[arg(long)]
         adapter: Option<String>,
         /// Largest batch to benchmark; 0 skips it.
@@ -258,14 +258,14 @@ pub enum CliCommand {
         /// The number of points.
         #[arg(long, default_value_t = 1_000_000)]
         points: u64,
-        /// Different seeds make different terrains.
+        /// Seed of the random terrain.
         #[arg(long, default_value_t = 1)]
         seed: u64,
         /// Overwrite an existing file.
         #[arg(long)]
         overwrite: bool,
     },
-    /// Print the script that lets a shell complete commands and options.
+    /// Print a shell completion script.
     ///
     /// For bash: gdt-batch completions bash > ~/.local/share/bash-completion/completions/gdt-batch
     Completions {
@@ -276,7 +276,7 @@ pub enum CliCommand {
     ///
     /// To read it: gdt-batch man | man -l -
     Man {
-        /// A command, for a page about it alone. Default: one page about all commands.
+        /// The command to document. Default: all commands, on one page.
         command: Option<String>,
     },
 }
@@ -290,19 +290,19 @@ pub struct DiffOptions {
     /// The later terrain.
     #[arg(value_hint = ValueHint::AnyPath)]
     pub after: PathBuf,
-    /// Count cut and fill only where the height changes by at least this much, in units of the heights. Default: 0.
+    /// Ignore height changes smaller than this, in units of the heights. Default: 0.
     #[arg(long, value_name = "HEIGHT", default_value_t = 0.0, hide_default_value = true, value_parser = threshold)]
     pub threshold: f64,
-    /// Also figures for each of these polygons: GeoJSON, GeoPackage or Shapefile. Their attribute "name" is shown.
+    /// Also report each polygon of this GeoJSON, GeoPackage or Shapefile, by its attribute "name".
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub areas: Option<PathBuf>,
-    /// Also write a raster of the differences and a mesh in their colours to this folder: a new one, or that of an earlier difference.
+    /// Also write a difference raster and a coloured mesh to this folder: a new one, or that of an earlier diff.
     #[arg(long, short, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub output: Option<PathBuf>,
     /// Cell size of the raster, in units of x and y. Default: about the point spacing of the finer terrain.
     #[arg(long, value_name = "LENGTH", requires = "output", value_parser = length)]
     pub resolution: Option<f64>,
-    /// The change with the strongest colours, in units of the heights. Default: more than nearly all changes.
+    /// The change with the strongest colours, in units of the heights. Default: a round number above 98 % of all changes.
     #[arg(long, value_name = "HEIGHT", requires = "output", value_parser = length)]
     pub range: Option<f64>,
     /// The memory that diff may use, such as "4 GiB".
@@ -316,20 +316,20 @@ pub struct ViewOptions {
     /// The output directory of a job.
     #[arg(value_hint = ValueHint::DirPath)]
     pub directory: PathBuf,
-    /// The port to listen on. Default: one that is free.
+    /// The port to listen on. Default: a free port.
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub port: u16,
     /// Do not open a browser.
     #[arg(long)]
     pub no_open: bool,
-    /// The address to listen on. With 0.0.0.0, every machine that reaches this one can read the results.
+    /// The address to listen on. With 0.0.0.0, any machine that can reach this one can read the results.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     pub address: IpAddr,
-    /// Another host name that browsers may use, such as that of a proxy. May be given several times.
+    /// Another host name that browsers may use, such as that of a proxy. Can be repeated.
     #[arg(long, value_name = "NAME", value_parser = host_name)]
     pub host: Vec<String>,
-    /// Send CORS headers, so that pages of other servers can read the results, such as your own map. Any page in a browser that reaches the
-    /// server can then read them.
+    /// Send CORS headers, so that pages from other origins, such as your own map, can read the results. So can any other page in a
+    /// browser that can reach the server.
     #[arg(long)]
     pub cors: bool,
 }
@@ -337,7 +337,7 @@ pub struct ViewOptions {
 fn host_name(text: &str) -> Result<String, String> {
     let is_name = |byte: u8| byte.is_ascii_alphanumeric() || b"-._".contains(&byte);
     if text.is_empty() || !text.bytes().all(is_name) {
-        return Err("give the name alone, such as maps.example.org, without http:// and without a port".into());
+        return Err("give only the name, such as maps.example.org, without http:// or a port".into());
     }
     Ok(text.into())
 }

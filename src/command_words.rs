@@ -95,7 +95,7 @@ fn may_be_configuration(word: &Path) -> bool {
 pub fn with_endings_of_clouds(error: Error, word: &Path) -> Error {
     match error {
         Error::Config(what) if word.is_file() && !is_called(word, &[TOML]) => Error::Config(format!(
-            "{what}\n{} is read as a configuration; a text of points ends in .{}",
+            "{what}\n{} is read as a configuration; a text file of points ends in .{}",
             word.display(),
             TEXT.join(", .")
         )),

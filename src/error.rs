@@ -22,7 +22,7 @@ pub enum Error {
     #[error(
         "the phase {phase} is not complete: of {count} tasks these failed: {}; {}",
         list(failed),
-        if *code == exit_code(ErrorKind::Retry) { "run the same command again to go on" } else { "they have said why" }
+        if *code == exit_code(ErrorKind::Retry) { "run the same command again to continue" } else { "see their messages" }
     )]
     Tasks {
         /// The phase.

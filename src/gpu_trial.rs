@@ -134,9 +134,9 @@ impl GpuTrial {
     pub fn verdict(&self) -> String {
         let times = self.seconds_without / self.seconds_with;
         if !self.same {
-            "the jobs with and without this GPU wrote different bytes: this is an error of gdt-batch".into()
+            "the jobs with and without this GPU wrote different bytes: this is a bug in gdt-batch".into()
         } else if self.on_gpu == 0 {
-            "this GPU made none of the leaves, so it is of no use here".into()
+            "this GPU made none of the leaves, so it does not help here".into()
         } else if (1.0 - NOISE..=1.0 + NOISE).contains(&times) {
             "on this machine a job takes about as long with this GPU as without it".into()
         } else if times > 1.0 {

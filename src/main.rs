@@ -259,7 +259,7 @@ fn request(path: &Path, engine: Engine, tasks: u32, restart: bool) -> Result<Req
 
 /// Says that a job is done, instead of sending it.
 fn nothing_to_send(path: &Path, dry_run: bool, print: PrintOptions) -> Result<ExitCode> {
-    say("nothing is sent, because the job is done; --restart does it again");
+    say("nothing was submitted, because the job is done; --restart runs it again");
     if dry_run {
         // What it prints is for a shell or for kubectl.
         return Ok(ExitCode::SUCCESS);
@@ -298,9 +298,10 @@ fn write_configuration(
 ) -> Result<ExitCode> {
     let is_printed = file == Path::new("-");
     if is_printed && print.json {
-        return Err(
-            sys::Error::Config("- prints the configuration, and --json something else: leave out one".into()).into()
-        );
+        return Err(sys::Error::Config(
+            "--write-config - and --json both print to standard output: leave out one".into(),
+        )
+        .into());
     }
     let made = on_threads(threads::available(), make)?;
     if is_printed {
@@ -321,7 +322,7 @@ fn show_configuration(made: &NewConfiguration, file: &Path, print: PrintOptions)
         say(&done);
         return Err(error);
     }
-    say(&format!("{done}, but what it says cannot be shown: {error}"));
+    say(&format!("{done}, but it cannot be printed: {error}"));
     Ok(())
 }
 
@@ -404,7 +405,9 @@ fn write_new_table(file: &Path, profile: &Profile) -> Result<()> {
     let is_table = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
     if file.exists() && !(file.is_file() && is_table) {
         let file = file.display();
-        return Err(sys::Error::Config(format!("{file} is there and no CSV file: name another file with -o")).into());
+        return Err(
+            sys::Error::Config(format!("{file} exists and is not a CSV file: choose another name with -o")).into()
+        );
     }
     let partial = file.with_extension("csv.partial");
     let write = || {
@@ -448,8 +451,7 @@ fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
 #[cfg(not(feature = "viewer"))]
 fn view_output(_: &ViewOptions, _: PrintOptions) -> Result<ExitCode> {
     Err(sys::Error::Config(
-        "this program was built without its server: build it with the feature \"viewer\", which is on by default"
-            .into(),
+        "this build of gdt-batch has no server: build it with the feature \"viewer\", which is on by default".into(),
     )
     .into())
 }

@@ -47,12 +47,12 @@ pub fn write(path: &Path, points: u64, seed: u64, overwrite: bool) -> Result<()>
     }
     if path.metadata().is_ok_and(|data| !data.is_file()) {
         // Opening a pipe would wait until another process reads from it.
-        return Err(Error::Config(format!("{} is there and is no regular file: give another name", path.display())));
+        return Err(Error::Config(format!("{} exists and is not a regular file: choose another name", path.display())));
     }
     let file = if overwrite { File::create(path) } else { File::create_new(path) };
     let file = file.map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => Error::Config(format!(
-            "{} exists already: give another name, remove it, or add --overwrite",
+            "{} exists already: choose another name, remove it, or add --overwrite",
             path.display()
         )),
         _ => Error::io("create", path)(error),

@@ -180,9 +180,7 @@ fn given(options: &CloudOptions) -> Option<&'static Flag> {
 pub fn refuse_beside_configuration(options: &CloudOptions, path: &Path) -> Result<()> {
     let path = path.display();
     if options.write_config.is_some() {
-        return Err(Error::Config(format!(
-            "--write-config is for point clouds, and {path} is a configuration already"
-        )));
+        return Err(Error::Config(format!("--write-config needs point clouds, but {path} is a configuration already")));
     }
     match given(options) {
         Some(flag) => {

@@ -14,7 +14,7 @@ pub struct CloudOptions {
     /// The output directory. Default: the name of the file or the folder with -terrain, in the current folder.
     #[arg(long, short, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub output: Option<PathBuf>,
-    /// The surface to make: ground is bare earth by the classes of points, bare-earth finds the ground, first has roofs and tree tops.
+    /// The surface: ground is bare earth from classified points, bare-earth finds the ground itself, first has roofs and tree tops.
     #[arg(long, value_name = "NAME", value_parser = choice("[input]", "surface"))]
     pub surface: Option<String>,
     /// Fewer triangles: keep every point within this height of the mesh, in the unit of heights.
@@ -32,7 +32,7 @@ pub struct CloudOptions {
     /// Also write terrain tiles for globes such as CesiumJS to terrain/. They need --height-offset if heights are above sea level.
     #[arg(long)]
     pub terrain: bool,
-    /// Keep only the points in this rectangle, in the coordinates of the files; with --to-crs, in those of that system.
+    /// Keep only the points in this rectangle, in the coordinates of the files; with --to-crs, in that CRS.
     #[arg(long, value_name = "XMIN,YMIN,XMAX,YMAX", allow_hyphen_values = true)]
     pub bounds: Option<Bounds>,
     /// Keep only the points within the polygons of this file: GeoJSON, GeoPackage or Shapefile, in any coordinate reference system.
@@ -50,13 +50,13 @@ pub struct CloudOptions {
     /// Colours of the vertices: an orthophoto (GeoTIFF, also by URL), or rgb, elevation, class or none.
     #[arg(long, value_name = "COLOR", value_parser = color)]
     pub color: Option<String>,
-    /// What to add to heights so that they are above the ellipsoid, as the globe needs them: egm96, a geoid grid, or metres.
+    /// What to add to heights to get heights above the ellipsoid, which globes need: egm96, a geoid grid, or metres.
     #[arg(long, value_name = "OFFSET", value_parser = offset, allow_negative_numbers = true)]
     pub height_offset: Option<Offset>,
-    /// What to do about a file that is damaged or no point cloud: stop, or leave it out.
+    /// What to do about a file that is damaged or not a point cloud: stop, or skip it.
     #[arg(long, value_name = "WHAT", value_parser = choice("[input]", "on_bad_file"))]
     pub on_bad_file: Option<String>,
-    /// Write the configuration that these options mean, and run nothing; - for standard output.
+    /// Write these options to a configuration file instead of running a job; - for standard output.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub write_config: Option<PathBuf>,
 }

@@ -27,7 +27,7 @@ pub(crate) fn about_syntax(text: &str, at: usize, said: &str) -> String {
         _ if said.starts_with("unclosed inline table") => "close the table with }".into(),
         _ if said.starts_with("key with no value") || said.starts_with("invalid unquoted key") => about_no_value(line),
         _ if said.starts_with("unexpected key or value") => about_rest(line),
-        said => format!("this is no TOML ({said})"),
+        said => format!("this is not valid TOML ({said})"),
     };
     place.before(&what)
 }

@@ -59,7 +59,7 @@ fn skipping(bad: &[String]) -> NeededLine {
         more => format!("; and {more} more"),
     };
     let named = bad.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join("; ");
-    let why = format!("Bad files are left out by this line: {named}{more}. Mend them, and remove it.");
+    let why = format!("This line leaves out bad files: {named}{more}. Repair them, and remove it.");
     NeededLine::of_input("on_bad_file", "skip", &why)
 }
 

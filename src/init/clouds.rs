@@ -206,10 +206,10 @@ mod tests {
         let (found, notes) = clouds(&root, &["a"]);
         // A pattern would match the link too.
         assert_eq!(found, ["a/1.laz", "a/2.laz"]);
-        assert!(notes.len() == 1 && notes[0].contains("3.laz is a link to a file that is not there"), "{notes:?}");
+        assert!(notes.len() == 1 && notes[0].contains("3.laz is a link to a missing file"), "{notes:?}");
         for argument in ["a/3.laz", "b"] {
             let (found, _) = clouds(&root, &[argument]);
-            assert!(found[0].contains(".laz is a link to a file that is not there"), "{found:?}");
+            assert!(found[0].contains(".laz is a link to a missing file"), "{found:?}");
         }
         // What cannot be read may be a cloud.
         write(&root, &["c/1.csv"]);

@@ -18,21 +18,20 @@ const LONGEST: u64 = 1 << 20;
 pub(crate) fn check_may_be_written(file: &Path, replace: bool) -> Result<()> {
     match file.metadata() {
         Ok(data) if !data.is_file() => Err(Error::Config(format!(
-            "{} is there and is no regular file: give another name, or - for standard output",
+            "{} exists and is not a regular file: choose another name, or - for standard output",
             file.display()
         ))),
         Ok(_) => match (is_configuration(file)?, replace) {
             (true, true) => Ok(()),
             (true, false) => Err(exists_already(file)),
             (false, _) => Err(Error::Config(format!(
-                "{} exists already and is no configuration of gdt-batch, so it is not replaced: give another name",
+                "{} exists already and is not a configuration of gdt-batch, so it is not overwritten: choose another name",
                 file.display()
             ))),
         },
-        Err(_) if file.is_symlink() => Err(Error::Config(format!(
-            "{} is a link that leads nowhere: remove it, or give another name",
-            file.display()
-        ))),
+        Err(_) if file.is_symlink() => {
+            Err(Error::Config(format!("{} is a broken link: remove it, or choose another name", file.display())))
+        }
         Err(_) => Ok(()),
     }
 }
@@ -46,7 +45,7 @@ pub(crate) fn check_is_no_cloud(file: &Path, clouds: &[PathBuf]) -> Result<()> {
     let is_it = |cloud: &PathBuf| cloud.canonicalize().is_ok_and(|cloud| cloud == file_itself);
     match clouds.iter().find(|cloud| is_it(cloud)) {
         Some(cloud) => Err(Error::Config(format!(
-            "{} is one of the point clouds ({}), so it is not replaced: give another name",
+            "{} is one of the point clouds ({}), so it is not overwritten: choose another name",
             file.display(),
             cloud.display()
         ))),
@@ -73,7 +72,7 @@ pub(crate) fn is_configuration(file: &Path) -> Result<bool> {
 }
 
 fn exists_already(file: &Path) -> Error {
-    Error::Config(format!("{} exists already: give another name, or add --force to replace it", file.display()))
+    Error::Config(format!("{} exists already: choose another name, or add --force to overwrite it", file.display()))
 }
 
 /// Writes the file whole or not at all. A link stays, and its target is replaced, which keeps its permissions.
@@ -152,7 +151,7 @@ mod tests {
         let [file, link] = ["a.toml", "link.toml"].map(|name| folder.path().join(name));
         symlink("a.toml", &link).unwrap();
         let what = check_may_be_written(&link, true).unwrap_err().to_string();
-        assert!(what.contains("leads nowhere"), "{what}");
+        assert!(what.contains("broken link"), "{what}");
         write(&file, "[input]", false).unwrap();
         fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
         write(&link, "new", true).unwrap();

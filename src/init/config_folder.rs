@@ -26,7 +26,7 @@ impl ConfigFolder {
         let path = file.parent().unwrap_or(Path::new("")).to_path_buf();
         if !named(&path).is_dir() {
             let (file, path) = (file.display(), path.display());
-            return Err(Error::Config(format!("{file}: there is no folder {path}: make it first")));
+            return Err(Error::Config(format!("{file}: there is no folder {path}: create it first")));
         }
         let (real, current) = (real(&path)?, real(Path::new(""))?);
         let is_current = real == current;
@@ -227,7 +227,7 @@ mod tests {
     fn a_folder_that_is_not_there_is_refused() {
         let root = tempfile::tempdir().unwrap();
         let what = ConfigFolder::of(Some(&root.path().join("no/job.toml"))).err().unwrap();
-        assert!(what.kind() == ErrorKind::Usage && what.to_string().contains("make it first"), "{what}");
+        assert!(what.kind() == ErrorKind::Usage && what.to_string().contains("create it first"), "{what}");
     }
 
     #[cfg(unix)]

@@ -48,7 +48,7 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
         page.say(&format!("It does not fit this machine: {obstacle}."));
     }
     page.need(draft.lines_of("limits"));
-    page.offer("memory = \"4 GiB\"", "the most memory that the job may take; this is the default");
+    page.offer("memory = \"4 GiB\"", "peak memory of the job; this is the default");
     if !draft.sets("threads") {
         page.offer(&format!("threads = {}", preflight.threads), "fewer leave room for other work");
     }
@@ -59,12 +59,12 @@ pub(crate) fn text_of(runnable: &Runnable, name: Option<&str>, notes: &[String])
 fn head(page: &mut Page, name: Option<&str>) {
     page.say(&format!("{FIRST_WORDS}, written by the program."));
     if let Some(name) = name {
-        page.show(&format!("gdt-batch check {name}"), "says what it would do");
+        page.show(&format!("gdt-batch check {name}"), "shows what it would do");
         page.show(&format!("gdt-batch {name}"), "runs it");
     }
-    page.say("A line with # and no blank after it is an option that is off: remove the # to use it.");
-    page.say("The manual explains all options in options.md. So does full.toml: it is in configs/ of the sources and of archives, and in \
-              share/doc/gdt-batch/ of installed packages.");
+    page.say("To enable an option, delete the # in front of it.");
+    page.say("options.md in the manual explains all options, and full.toml has them with comments: configs/ in sources and archives, \
+              share/doc/gdt-batch/ in installed packages.");
 }
 
 fn files(patterns: &[String]) -> String {
@@ -85,7 +85,7 @@ fn about_surface(page: &mut Page, findings: &Findings, draft: &Draft, sources: &
         page.offer("surface = \"ground\"", "bare earth: only points on the ground and on water");
     }
     if offers.bare_earth && !draft.sets("surface") {
-        page.offer("surface = \"bare-earth\"", "bare earth: the program finds the ground, whatever the classes are");
+        page.offer("surface = \"bare-earth\"", "bare earth: a ground filter, which ignores the classes");
     }
     let has_returns = sources.iter().any(|source| source.by_return.iter().skip(1).any(|count| *count > 0));
     if has_returns && !draft.sets("surface") {
@@ -104,7 +104,7 @@ fn about_coordinates(page: &mut Page, findings: &Findings, draft: &Draft, (is_na
     }
     page.blank();
     page.say(&findings.crs);
-    let what = if is_named { "if that is wrong: what all files are in" } else { "what all files are in" };
+    let what = if is_named { "the CRS of all files, if that is wrong" } else { "what all files are in" };
     if !draft.sets("crs") && !draft.sets("missing_crs") {
         page.offer("crs = \"EPSG:26915\"", what);
     }
@@ -123,7 +123,10 @@ fn about_area(page: &mut Page, sources: &[&Source]) {
     if least > 0.001 {
         let [xmin, ymin, xmax, ymax] = sides.map(|side| format!("{side:.decimals$}"));
         page.blank();
-        page.offer(&format!("bounds = [{xmin}, {ymin}, {xmax}, {ymax}]"), "a quarter of the area, in its middle");
+        page.offer(
+            &format!("bounds = [{xmin}, {ymin}, {xmax}, {ymax}]"),
+            "for a trial: a quarter of the area, in its middle",
+        );
     }
 }
 
@@ -131,7 +134,7 @@ fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight, plan: &Pl
     page.blank();
     page.set("[output]");
     if preflight.disk_earlier > 0 {
-        page.say("This folder has the results of an earlier job. They stay until those of this job are whole.");
+        page.say("This folder has the results of an earlier job. They are kept until those of this job are complete.");
     }
     page.set(&format!("directory = {}", quoted(&draft.directory)));
     page.need(draft.lines_of("output"));
@@ -152,10 +155,10 @@ fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight, plan: &Pl
             "also writes terrain.xml for CAD; \"dxf\", \"obj\" and \"ply\" for other programs",
         );
     }
-    page.offer("height_offset = \"egm96\"", "if heights count from the sea: then they are right on the globe");
-    page.offer("copyright = \"(c) whose data\"", "goes into every file, and viewers show it");
+    page.offer("height_offset = \"egm96\"", "if heights are above sea level: corrects them on the globe");
+    page.offer("copyright = \"(c) whose data\"", "copyright notice in every file, shown by viewers");
     if is_built_in() {
-        page.offer("page = true", "also writes a page that shows the terrain in a browser");
+        page.offer("page = true", "also writes a viewer for any web server");
     }
 }
 
@@ -166,7 +169,7 @@ fn max_error(preflight: &Preflight, plan: &Plan) -> Option<(String, String)> {
     let triangles = |vertices: u64| grouped(2 * vertices);
     let [first, second, third] = vertices[..] else { return None };
     let what = format!(
-        "fewer triangles, with all points this near: about {} instead of {}; {}: {}, {}: {}",
+        "fewer triangles, all points within this height of the mesh: about {} instead of {}; {}: {}, {}: {}",
         triangles(first),
         triangles(preflight.kept),
         bounds[1],
@@ -211,7 +214,7 @@ pub(crate) fn choice_of(line: &NeededLine) -> String {
 /// Returns what the summary says of the units of a job.
 pub(crate) fn units_of(preflight: &Preflight, plan: &Plan) -> String {
     match plan.crs.horizontal {
-        Unit::Unknown => format!("{} (no file says it)", preflight.unit),
+        Unit::Unknown => format!("{} (not stated by the files)", preflight.unit),
         unit => match unit_of_heights(plan) {
             Some(z) => format!("{} in x and y, {} in z", unit.name(), z.name()),
             None => format!("{} in x and y; {NO_UNIT_OF_HEIGHTS}", unit.name()),

@@ -12,7 +12,7 @@ use points::{FileFormat, Source};
 const MOST_NAMED: usize = 3;
 
 /// What is said of the unit of z where no file says it, and no name of a column.
-pub(crate) const NO_UNIT_OF_HEIGHTS: &str = "nothing says the unit of z: that of x and y is taken";
+pub(crate) const NO_UNIT_OF_HEIGHTS: &str = "the unit of z is unknown: that of x and y is assumed";
 
 /// A map of a zone is badly distorted over areas that are wider, in metres.
 const WIDE: f64 = 1e6;
@@ -48,7 +48,7 @@ impl Findings {
             classes: classes(&sources, plan),
             surface: match &preflight.surface {
                 Some(surface) => format!("Surface: {surface}."),
-                None => "Surface: a sample of the points says nothing about it.".into(),
+                None => "Surface: unknown from a sample of the points.".into(),
             },
             memory: memory(preflight),
         }
@@ -67,10 +67,7 @@ fn points(draft: &Draft, sources: &[&Source], preflight: &Preflight, plan: &Plan
         let [width, height] = [0, 1].map(|axis| max[axis] - min[axis]);
         said.push(format!("Area: x {}, y {}: {width:.1} x {height:.1} {unit}.", along(0), along(1)));
         if draft.sets("to_crs") && width.max(height) * plan.crs.metres_per_unit().unwrap_or(1.0) > WIDE {
-            said.push(
-                "Note: that is wide for one map, which is distorted at its ends: better run a job for each region."
-                    .into(),
-            );
+            said.push("Note: one map of this width is distorted at its ends: better run a job for each region.".into());
         }
     }
     said
@@ -96,12 +93,12 @@ pub(crate) fn rectangle(sources: &[&Source]) -> Option<[[f64; 2]; 2]> {
 
 fn unit(draft: &Draft, sources: &[&Source], plan: &Plan, is_unknown: bool) -> String {
     if is_unknown {
-        return "Unit: no file says it, so metres are taken. If the coordinates are in feet, say so here:".into();
+        return "Unit: no file states it, so metres are assumed. If the coordinates are in feet, set it here:".into();
     }
     let by = match sources.iter().any(|source| source.own_crs().is_named()) || plan.crs.is_named() {
-        true => "as the coordinate reference system says",
+        true => "from the CRS",
         false if draft.sets("unit") => "as this configuration sets it",
-        false => "as the names of columns say",
+        false => "from the column names",
     };
     let xy = plan.crs.horizontal.name();
     match unit_of_heights(plan) {
@@ -122,13 +119,13 @@ fn crs(draft: &Draft, sources: &[&Source], plan: &Plan) -> String {
         return format!("CRS: {}, as this configuration sets it.", plan.crs.label());
     }
     if draft.sets("crs") && !draft.sets("to_crs") {
-        return "CRS: none, because the coordinates are not what the files say.".into();
+        return "CRS: none, because the coordinates contradict that of the files.".into();
     }
     if draft.sets("to_crs") {
         return format!("CRS: {}. {}", plan.crs.label(), transformed(sources));
     }
     let (true, Some(first)) = (plan.crs.is_named(), named.first()) else {
-        return "CRS: no file names one, so viewers cannot show the terrain on the globe. If you know it, say it here:"
+        return "CRS: no file names one, so viewers cannot show the terrain on the globe. If you know it, set it here:"
             .into();
     };
     let heights = plan.crs.vertical_name().map_or(String::new(), |name| format!(" Heights: {name}."));

@@ -170,8 +170,8 @@ fn lines_for_memory(obstacle: &Error, threads: usize) -> Vec<NeededLine> {
             fewer.map(|threads| NeededLine::of_limits("threads", threads as i64, why)).collect()
         }
         Error::System(sys::Error::Io { source, .. }) if source.kind() == ErrorKind::StorageFull => {
-            let why = "If the job keeps its mesh, it takes more disk than is free. Without it an interrupted job cannot go on with another \
-                       style.";
+            let why = "If the job keeps its mesh, it takes more disk than is free. Without it, an interrupted job cannot continue with \
+                       another style.";
             vec![NeededLine::of_limits("keep_steps", false, why)]
         }
         _ => Vec::new(),

@@ -12,7 +12,7 @@ use sys::{Error, Result};
 const MOST_NAMED: usize = 4;
 
 /// Why datums are taken for one.
-const WHY_CLOSE: &str = "The datums of the files differ by a metre or two. They are taken for one.";
+const WHY_CLOSE: &str = "The datums of the files differ by a metre or two. They are treated as one.";
 
 /// CrsAttempts to run a draft that is refused as it is. Each is tried in turn.
 pub(crate) struct CrsAttempts {
@@ -97,24 +97,18 @@ impl CrsAttempts {
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         let reason = match (in_degrees, systems.len()) {
             (0, _) => format!("The files are in different systems: {}{more}.", systems.join("; ")),
-            (_, 0 | 1) => {
-                "The coordinates are longitude and latitude, in which triangles would be distorted.".to_string()
-            }
-            _ => format!(
-                "Some files are in degrees, in which triangles would be distorted: {}{more}.",
-                systems.join("; ")
-            ),
+            (_, 0 | 1) => "The coordinates are longitude and latitude, which would distort triangles.".to_string(),
+            _ => format!("Some files are in degrees, which would distort triangles: {}{more}.", systems.join("; ")),
         };
         format!(
-            "{reason} So all points are transformed into the UTM zone of their middle. Any projected CRS may stand here."
+            "{reason} So all points are transformed into the UTM zone of their middle. Any projected CRS works here."
         )
     }
 
     fn why_plane(&self) -> String {
         let farthest = |axis: usize| self.sources.iter().map(|source| farthest(source, axis)).fold(0.0, f64::max);
         format!(
-            "The files say that their coordinates are degrees, but x goes to {:.2} and y to {:.2}, and no place on earth is there: they \
-             are taken as a plane.",
+            "The CRS of the files is in degrees, but x goes to {:.2} and y to {:.2}, which is not on earth: they are treated as a plane.",
             farthest(0),
             farthest(1)
         )
@@ -129,8 +123,7 @@ impl CrsAttempts {
         let first = nameless.next()?;
         let are_degrees = first.crs.horizontal == Unit::Degree && nameless.all(|s| s.crs.horizontal == Unit::Degree);
         let why = format!(
-            "The columns of {} are longitude and latitude, and nothing says of which system: WGS 84 is taken. Change it if they are of \
-             another one.",
+            "The columns of {} are longitude and latitude in an unknown CRS: WGS 84 is assumed. Change it if that is wrong.",
             first.path.display()
         );
         are_degrees.then(|| NeededLine::of_input("missing_crs", "EPSG:4326", &why))

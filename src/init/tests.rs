@@ -94,7 +94,7 @@ fn a_text_without_a_name_gets_the_options_that_help_it() {
     fs::write(folder.path().join("cloud.csv"), "x,y,z\n0,0,1\n9,0,2\n9,9,3\n0,9,4\n4,5,6\n").unwrap();
     let new = made(folder.path());
     for words in [
-        "# Unit: no file says it",
+        "# Unit: no file states it",
         "\n#unit = \"us-foot\"",
         "# CRS: no file names one",
         "\n#crs = ",
@@ -119,7 +119,7 @@ fn what_is_needed_stands_there_with_its_reason() {
     assert!(new.text.contains("\nto_crs = \"utm\"\n") && new.text.contains("UTM zone 32N"), "{}", new.text);
     assert!(!new.text.contains("#to_crs") && !new.text.contains("#unit"), "{}", new.text);
     // Names of columns say no unit of z, nor does the system of the map.
-    assert_eq!(new.unit, "metre in x and y; nothing says the unit of z: that of x and y is taken");
+    assert_eq!(new.unit, "metre in x and y; the unit of z is unknown: that of x and y is assumed");
     // One row that is damaged, and one file that is no cloud.
     fs::write(folder.path().join("a.csv"), format!("{rows}11.5x,48,1\n")).unwrap();
     fs::write(folder.path().join("b.csv"), "version https://git-lfs.github.com/spec/v1\n").unwrap();

@@ -275,13 +275,13 @@ fn in_the_way(request: &Request, options: &KubernetesOptions, name: &str, config
     let another = "give this job another name with -- --name NAME";
     Error::Engine(match configuration {
         "" => format!(
-            "job.batch/{name} is there, and does not say of which configuration it is: {another}. If it is an earlier submission of {own}, \
+            "job.batch/{name} exists, and does not name its configuration: {another}. If it is an earlier submission of {own}, \
              wait for its end ({watch}), then remove it: {remove}"
         ),
         same if same == own => format!(
             "job.batch/{name} of an earlier submission is still there: wait for its end ({watch}), then remove it: {remove}"
         ),
-        other => format!("job.batch/{name} is there, and is of another configuration ({other}): {another}"),
+        other => format!("job.batch/{name} exists, and belongs to another configuration ({other}): {another}"),
     })
 }
 
@@ -295,7 +295,7 @@ fn kubectl(options: &KubernetesOptions, arguments: &[&str], input: &str) -> Resu
     let mut child = match command.spawn() {
         Err(e) if e.kind() == ErrorKind::NotFound => {
             return Err(sys::Error::Config(
-                "there is no kubectl here: with --dry-run, submit prints what it would get".into(),
+                "kubectl was not found: with --dry-run, submit prints the YAML instead".into(),
             )
             .into());
         }
@@ -395,7 +395,7 @@ mod tests {
         assert!(other.contains("another configuration (survey:/data/other/job.toml)"), "{other}");
         assert!(other.contains("--name") && !other.contains("delete"), "{other}");
         let unknown = said("");
-        assert!(unknown.contains("does not say of which configuration") && unknown.contains("--name"), "{unknown}");
+        assert!(unknown.contains("does not name its configuration") && unknown.contains("--name"), "{unknown}");
     }
 
     #[test]

@@ -65,16 +65,14 @@ fn check_options(added: &[String]) -> sys::Result<()> {
     };
     match added.iter().find(is_ours) {
         None => Ok(()),
-        Some(word) => {
-            Err(sys::Error::Config(format!("{word}: submit itself says to sbatch which tasks run, and when")))
-        }
+        Some(word) => Err(sys::Error::Config(format!("{word}: submit sets this option itself"))),
     }
 }
 
 /// Returns the limit for the numbers of an array's elements.
 fn max_array_size() -> Result<u32> {
     let config = output_of("scontrol", &["show".into(), "config".into()])?;
-    limit_in(&config).ok_or_else(|| Error::Engine("scontrol show config says nothing of MaxArraySize".into())).and_then(
+    limit_in(&config).ok_or_else(|| Error::Engine("scontrol show config does not show MaxArraySize".into())).and_then(
         |limit| match limit {
             0 | 1 => {
                 Err(sys::Error::Config("this Slurm allows no arrays: its MaxArraySize must be 2 or more".into()).into())
@@ -113,7 +111,7 @@ fn send_array(array: &Array, request: &Request, after: &[String], added: &[Strin
     // In a federation the name of a cluster follows.
     let number = answer.trim().split(';').next().unwrap_or_default();
     if number.is_empty() || !number.bytes().all(|byte| byte.is_ascii_digit()) {
-        return Err(Error::Engine(format!("sbatch answered {answer:?}, which is no number of a job")));
+        return Err(Error::Engine(format!("sbatch answered {answer:?}, which is not a job number")));
     }
     Ok(number.into())
 }
@@ -139,7 +137,7 @@ fn output_of(command: &'static str, arguments: &[String]) -> Result<String> {
     let output = match Command::new(command).args(arguments).output() {
         Err(e) if e.kind() == ErrorKind::NotFound => {
             return Err(sys::Error::Config(format!(
-                "there is no {command} here: run this where Slurm's commands are, or take --engine local"
+                "{command} was not found: run this on a machine with Slurm's commands, or use --engine local"
             ))
             .into());
         }

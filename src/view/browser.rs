@@ -6,7 +6,7 @@
 /// A text for the user.
 pub fn open(url: &str) -> Result<(), String> {
     if !has_screen() {
-        return Err("there is no screen here".into());
+        return Err("this machine has no screen".into());
     }
     open::that_detached(url).map_err(|error| error.to_string())
 }

@@ -75,7 +75,7 @@ impl fmt::Display for View {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} is shown at {}", self.directory.display(), self.url)?;
         if self.is_public {
-            writeln!(f, "every machine that reaches this one can read the results in it")?;
+            writeln!(f, "any machine that can reach this one can read the results in it")?;
         }
         write!(f, "Ctrl-C ends it")
     }
@@ -111,7 +111,7 @@ fn terrain_in(directory: &Path) -> Result<&'static str> {
         return Err(verify::Error::Unfinished { directory: directory.into() }.into());
     }
     Err(sys::Error::Config(format!(
-        "{} has neither tileset.json nor terrain.glb: name the [output] directory of a job that is done",
+        "{} has neither tileset.json nor terrain.glb: name the [output] directory of a finished job",
         directory.display()
     ))
     .into())
@@ -121,9 +121,9 @@ fn not_listening(address: SocketAddr, error: &std::io::Error) -> Error {
     use std::io::ErrorKind::{AddrInUse, PermissionDenied};
     let port = address.port();
     match error.kind() {
-        AddrInUse => Error::Port(format!("another program has port {port}: give another one with --port, or none")),
+        AddrInUse => Error::Port(format!("port {port} is in use: choose another --port, or leave it out")),
         PermissionDenied => {
-            sys::Error::Config(format!("port {port} is for the system only: give --port 1024 or more")).into()
+            sys::Error::Config(format!("port {port} is reserved for the system: use --port 1024 or higher")).into()
         }
         _ => {
             sys::Error::Config(format!("cannot listen on {address}: {error}; give an --address of this machine")).into()

@@ -187,6 +187,6 @@ fn configurations_of_one_name_do_not_meet() {
     let refused = named(&second, &["--name", "north"]);
     let why = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(1), "{why}");
-    assert!(why.contains("job.batch/north-plan is there, and is of another configuration"), "{why}");
+    assert!(why.contains("job.batch/north-plan exists, and belongs to another configuration"), "{why}");
     assert!(why.contains(first.path().to_str().unwrap()) && !why.contains("delete"), "{why}");
 }

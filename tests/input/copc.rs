@@ -112,8 +112,8 @@ fn a_wrong_octree_is_left_aside_with_a_warning() {
         (&|entries| entries[2].points += 1, "the table of chunks has not"),
         (&|entries| entries[2].bytes -= 1, "the table of chunks has not"),
         (&|entries| entries[2].at += 1, "the table of chunks has not"),
-        (&|entries| entries[4].key = [3, 8, 0, 0], "[3, 8, 0, 0] (level, x, y, z), which lies in no octree"),
-        (&|entries| entries[4].key = [31, 0, 0, 0], "lies in no octree"),
+        (&|entries| entries[4].key = [3, 8, 0, 0], "[3, 8, 0, 0] (level, x, y, z), which lies outside the octree"),
+        (&|entries| entries[4].key = [31, 0, 0, 0], "lies outside the octree"),
         (&|entries| entries[1].points = -1, "is none"),
         (&|entries| entries.iter_mut().for_each(|entry| entry.key.swap(1, 2)), "where it does not lie"),
     ];
@@ -131,9 +131,9 @@ fn a_wrong_octree_is_left_aside_with_a_warning() {
     let (info, root) = (429, number(429 + 40) as usize);
     let last = root + number(info + 48) as usize - 32;
     for (at, value, words) in [
-        (info, f64::NAN.to_bits(), "a cube that is none"),
-        (info + 24, (-1.0f64).to_bits(), "a cube that is none"),
-        (info + 24, f64::MAX.to_bits(), "a cube that is none"),
+        (info, f64::NAN.to_bits(), "an invalid cube"),
+        (info + 24, (-1.0f64).to_bits(), "an invalid cube"),
+        (info + 24, f64::MAX.to_bits(), "an invalid cube"),
         (info + 24, 1.0f64.to_bits(), "where it does not lie"),
         (info + 40, u64::MAX - 5, "which is none"),
         (info + 48, 33, "which is none"),

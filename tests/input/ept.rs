@@ -121,13 +121,13 @@ fn an_index_that_cannot_be_used_is_refused() {
     for (from, to, words) in [
         ("\"laszip\"", "\"draco\"", "nodes of the type \"draco\""),
         ("\"json\"", "\"gz\"", "a hierarchy of the type \"gz\""),
-        ("\"points\":10000", "\"points\":9999", "says it has 9999 points, but the nodes of its hierarchy have 10000"),
-        ("\"points\":10000", "\"points\":-1", "is no index of an EPT that can be read"),
+        ("\"points\":10000", "\"points\":9999", "claims 9999 points, but the nodes of its hierarchy have 10000"),
+        ("\"points\":10000", "\"points\":-1", "is not a readable EPT index"),
         ("\"name\":\"Y\"", "\"name\":\"y\"", "has no dimension Y"),
         ("\"type\":\"signed\"", "\"type\":\"floating\"", "has X as floating numbers without a scale"),
         ("\"scale\":0.01", "\"scale\":0", "as the scale of x"),
-        ("\"scale\":0.01", "\"scale\":0.001", "this node has another scale or offset than the index says"),
-        ("\"bounds\":[", "\"bounds\":[1e9, 1e9, 1e9, 0, 0, 0], \"other\":[", "no cube"),
+        ("\"scale\":0.01", "\"scale\":0.001", "this node has another scale or offset than the index"),
+        ("\"bounds\":[", "\"bounds\":[1e9, 1e9, 1e9, 0, 0, 0], \"other\":[", "not a cube"),
     ] {
         let error = error_of(NodeType::Laszip, ALL, |files| files.edit("ept.json", replaced(from, to)));
         assert!(error.contains(words), "{words}: {error}");
@@ -157,7 +157,7 @@ fn nodes_that_do_not_fit_the_hierarchy_are_named() {
         let other = files.0[west].repeat(length / files.0[west].len() + 1);
         files.edit(east, |bytes| bytes.copy_from_slice(&other[..length]));
     });
-    assert!(error.contains("ept-data/1-1-1-1.bin lies elsewhere than the octree says"), "{error}");
+    assert!(error.contains("ept-data/1-1-1-1.bin lies outside its cell of the octree"), "{error}");
 }
 
 #[test]

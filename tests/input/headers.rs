@@ -14,7 +14,7 @@ fn every_wrong_header_field_is_named() {
     let table: Vec<(usize, Vec<u8>, &str)> = vec![
         (24, vec![2], "version 2.4"),
         (25, vec![9], "version 1.9"),
-        (94, vec![100, 0], "header has 100 bytes"),
+        (94, vec![100, 0], "header of 100 bytes"),
         (96, vec![0, 0, 0, 0], "points begin at byte 0"),
         (96, vec![0xff, 0xff, 0xff, 0x7f], "points begin at byte 2147483647"),
         (104, vec![11], "format 11"),

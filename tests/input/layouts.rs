@@ -141,7 +141,7 @@ fn units_beside_and_below_the_names_are_used() {
         assert_eq!(crs(["x [m]", "y [m]", "z"]).horizontal, Unit::Metre);
     }
     for (header, words) in
-        [("x [m];y [ft];z", "m for x and ft for y"), ("x [m];y [m];z\nmm;mm;mm", "the line below it says mm")]
+        [("x [m];y [ft];z", "m for x and ft for y"), ("x [m];y [m];z\nmm;mm;mm", "the line below it has mm")]
     {
         let error = text(&format!("{header}\n{rows}")).err().expect("was read");
         assert!(error.kind() == ErrorKind::Input && error.to_string().contains(words), "{error}");

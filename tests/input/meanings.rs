@@ -201,7 +201,7 @@ fn units_in_a_comment_below_names_in_a_comment_are_used() {
     let cloud = assert_two_points("# x y z\n# in m\n# ft, m, see below\n1.5,2,3.25\n4,5,6\n");
     assert_eq!(cloud.source.crs.horizontal, Unit::Unknown);
     let error = text("# x [m],y [m],z [m]\n# ft,ft,ft\n1.5,2,3.25\n4,5,6\n").err().expect("was read");
-    assert!(error.kind() == ErrorKind::Input && error.to_string().contains("the line below it says ft"), "{error}");
+    assert!(error.kind() == ErrorKind::Input && error.to_string().contains("the line below it has ft"), "{error}");
 }
 
 #[test]
@@ -236,7 +236,7 @@ fn degrees_that_no_name_tells_are_a_warning() {
     for header in ["X,Y,Z\n", "POINT_X,POINT_Y,POINT_Z\n", ""] {
         let cloud = text(&format!("{header}{rows}")).unwrap();
         assert!(
-            first_warning(&cloud).contains("look like longitude and latitude, but are taken as lengths"),
+            first_warning(&cloud).contains("look like longitude and latitude, but are treated as lengths"),
             "{header:?}"
         );
     }
@@ -358,7 +358,7 @@ fn remarks_are_no_headers() {
         assert!(cloud.source.warnings.iter().next().is_none(), "{remark}: {:?}", cloud.source.warnings);
     }
     let cloud = text("# Meyer, Berger, Bern\n1.5,2,3.25\n4,5,6\n").unwrap();
-    assert!(first_warning(&cloud).contains("the first three are taken for x, y and z"));
+    assert!(first_warning(&cloud).contains("the first three are taken as x, y and z"));
 }
 
 #[test]

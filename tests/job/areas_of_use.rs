@@ -72,7 +72,7 @@ fn coordinates_of_another_country_and_of_a_plane_are_refused_with_their_cures() 
         // Krovak's projection has another form than all others.
         ("south.csv", [700_000.0, 1_050_000.0], 5514, "S-JTSK"),
         ("feet.csv", [1_640_419.0, 18_044_619.0], 25832, "in the unit foot, they lie within it"),
-        ("nowhere.csv", [30_000_000.0, 5_500_000.0], 25832, "are no place on earth"),
+        ("nowhere.csv", [30_000_000.0, 5_500_000.0], 25832, "are not on earth"),
     ] {
         let file = csv(&folder, name, place, if name == "degrees.csv" { 1e-4 } else { 7.0 });
         let job = Job::on(&[&file]).with("input", &format!("crs = \"EPSG:{crs}\""));

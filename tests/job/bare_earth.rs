@@ -82,7 +82,7 @@ fn the_ground_is_found_and_proved() {
     let more = [write(folder.path(), "more.csv", &more)];
     let said = against(&job, &more);
     assert!(
-        said.code == 4 && said.json()["failures"].to_string().contains("1 points of the inputs are no vertices"),
+        said.code == 4 && said.json()["failures"].to_string().contains("1 points of the inputs are not vertices"),
         "{said:?}"
     );
 }

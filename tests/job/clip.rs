@@ -213,13 +213,13 @@ fn files_that_are_no_area_and_areas_without_points_are_refused() {
     refused(
         &ring("[[500000, 4000000], [500010, 4000000], [500000, 4000010], [500000, 4000000]]"),
         3,
-        &["says no CRS", "-a_srs"],
+        &["has no CRS", "-a_srs"],
     );
     let nowhere = r#"{"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::1"}}"#;
     let there = "[[15, 36], [15.1, 36], [15, 36.1], [15, 36]]";
     let unknown = format!(r#"{{"type": "Polygon", "crs": {nowhere}, "coordinates": [{there}]}}"#);
     refused(&unknown, 2, &["is in EPSG:1", "Transform the polygons first", "-a_srs"]);
-    refused("no JSON", 3, &["is no Shapefile, GeoPackage or GeoJSON", "polygons.gpkg"]);
+    refused("no JSON", 3, &["is not a Shapefile, GeoPackage or GeoJSON", "polygons.gpkg"]);
     // No point of the survey is near: both boxes are told.
     let far = vec![vec![vec![[50_000, 0], [60_000, 0], [60_000, 9_000]]]; 2];
     let clip = geojson(folder.path(), "far.geojson", &far);

@@ -161,8 +161,7 @@ fn an_input_where_a_result_would_be_is_named() {
         fs::write(here.join("breaklines.csv"), &cloud).unwrap();
         let config = LEAST.replace("\"out\"", &format!("{directory:?}")).replace("cloud.csv", "*.csv");
         fs::write(here.join("job.toml"), config).unwrap();
-        let words =
-            ["[input] files: ", "breaklines.csv is where a job writes a result", "choose another [output] directory"];
+        let words = ["[input] files: ", "breaklines.csv has the name of a result", "choose another [output] directory"];
         gdt_batch(&here, &["job.toml"]).refused(2, &words);
         assert!(fs::read(here.join("breaklines.csv")).unwrap() == cloud);
     }
@@ -186,7 +185,7 @@ fn anything_in_the_way_of_the_output_is_named() {
         refused(name, "is not a directory");
         fs::remove_file(there(name)).unwrap();
         std::os::unix::fs::symlink("nowhere", there(name)).unwrap();
-        refused(name, "is a link that leads nowhere");
+        refused(name, "is a broken link");
         fs::remove_file(there(name)).unwrap();
     };
     by_files("out");
@@ -201,7 +200,7 @@ fn anything_in_the_way_of_the_output_is_named() {
     // A file that no job wrote, in the place of the report.
     fs::write(there("out/report.json"), "theirs").unwrap();
     for arguments in [&["job.toml"][..], &["check", "job.toml"]] {
-        gdt_batch(folder.path(), arguments).refused(2, &["out/report.json", "would overwrite", "move it away"]);
+        gdt_batch(folder.path(), arguments).refused(2, &["out/report.json", "would be overwritten", "move it away"]);
     }
     fs::remove_file(there("out/report.json")).unwrap();
     gdt_batch(folder.path(), &["job.toml"]).succeeded();
@@ -222,7 +221,7 @@ fn files_of_others_among_the_results_of_an_earlier_job_are_named_and_stay() {
         fs::write(there(name), "theirs").unwrap();
         let report = fs::read(there("report.json")).unwrap();
         for arguments in [&["job.toml"][..], &["--restart", "job.toml"], &["check", "job.toml"]] {
-            run(arguments).refused(2, &[name, "nothing says that an earlier job wrote it", "move it away"]);
+            run(arguments).refused(2, &[name, "is not known to be a result of an earlier job", "move it away"]);
         }
         assert_eq!(fs::read(there(name)).unwrap(), b"theirs");
         assert!(fs::read(there("report.json")).unwrap() == report, "{name}");
@@ -235,7 +234,8 @@ fn files_of_others_among_the_results_of_an_earlier_job_are_named_and_stay() {
     assert!(there("tiles/roof.glb").exists() && there("notes.txt").exists());
     // Without the list nothing tells whose the files are.
     fs::remove_file(there("XXH128SUMS")).unwrap();
-    run(&["job.toml"]).refused(2, &["nothing says that an earlier job wrote it", "XXH128SUMS is gone or damaged"]);
+    run(&["job.toml"])
+        .refused(2, &["is not known to be a result of an earlier job", "XXH128SUMS is missing or damaged"]);
     fs::remove_dir_all(folder.path().join("out")).unwrap();
     run(&["job.toml"]).succeeded();
 }

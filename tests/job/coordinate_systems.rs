@@ -111,7 +111,7 @@ fn the_cure_of_a_geocentric_system_is_one_that_helps() {
     }
     // The user states a CRS already, or the other file does.
     let full = "the record is ignored";
-    let short = "its geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored, because [input] names another";
+    let short = "its geocentric coordinate system (WGS 84 (EPSG:4978)) is ignored, because [input] sets another";
     for (files, line, words) in [
         (vec![&false_record], "crs = \"EPSG:26915\"", [short, full]),
         (vec![&false_record, &bare], "missing_crs = \"EPSG:26915\"", [short, full]),
@@ -163,7 +163,10 @@ fn the_unit_of_a_false_record_gives_way_to_every_other_statement() {
     let said = warnings(&Job::on(&[&silent]).report());
     assert!(said.contains("no input states a known unit of length: metres assumed; fix: set [input] unit"), "{said}");
     let said = warnings(&Job::on(&[&in_metres]).report());
-    assert!(said.contains("x and y are a plane in metre") && !said.contains("no input states a known unit"), "{said}");
+    assert!(
+        said.contains("x and y are treated as a plane in metre") && !said.contains("no input states a known unit"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -186,7 +189,7 @@ fn geocentric_coordinates_are_refused_by_code_text_and_keys() {
         assert_eq!((unplaced["unit"].as_str(), unplaced["crs"].as_str()), (Some("us-foot"), None));
         assert_eq!(Job::on(&[&file]).report()["unit"], "metre");
         move_to(&file, [4_177_000.0, 855_000.0, 4_728_000.0]);
-        let words = ["geocentric", "z is no height", "pdal translate", "[input] crs"];
+        let words = ["geocentric", "z is not a height", "pdal translate", "[input] crs"];
         Job::on(&[&file]).run().refused(2, &words);
         Job::on(&[&file]).with("input", "unit = \"metre\"").run().refused(2, &words);
         Job::on(&[&file]).with("input", "crs = \"none\"").report();
@@ -323,7 +326,7 @@ fn a_projection_without_its_origin_is_not_placed_and_is_named() {
     }
     let file = write(folder.path(), "plain.las", &[]);
     let given = Job::on(&[&file]).with("input", &format!("crs = '''{lost}'''")).report();
-    assert!(warnings(&given).contains("[input] crs (UTM_15N): nobody can tell"), "{given}");
+    assert!(warnings(&given).contains("[input] crs (UTM_15N): the place of its coordinates is unknown"), "{given}");
 }
 
 #[test]
@@ -426,7 +429,7 @@ fn a_map_that_is_not_computed_is_not_placed_and_is_named() {
     ] {
         let job = table_job(folder.path(), code, place);
         let said = warnings(&job.report());
-        assert!(said.contains(&format!("not placed on the globe: this program does not compute {what}")), "{said}");
+        assert!(said.contains(&format!("not placed on the globe: gdt-batch does not support {what}")), "{said}");
         assert!(said.contains("pdal translate"), "{said}");
         job.verified();
         let tileset: Value = serde_json::from_slice(&fs::read(job.out().join("tileset.json")).unwrap()).unwrap();
@@ -477,7 +480,7 @@ fn northings_that_are_as_great_as_the_radius_of_the_earth_are_no_geocentric_coor
     [131, 139].into_iter().for_each(|at| bytes[at..at + 8].copy_from_slice(&0.1f64.to_le_bytes()));
     fs::write(&file, bytes).unwrap();
     let said = warnings(&Job::on(&[&file]).report());
-    assert!(said.contains("is geocentric, but its points would stand upright near the equator"), "{said}");
+    assert!(said.contains("is geocentric, but its points would be vertical near the equator"), "{said}");
 }
 
 #[test]
@@ -496,7 +499,7 @@ fn a_file_without_a_system_whose_coordinates_look_like_degrees_is_named() {
             write(&mut bytes, 187 + 16 * axis, place - half);
         }
         fs::write(&file, bytes).unwrap();
-        let words = "look like longitude and latitude, but are taken as lengths";
+        let words = "look like longitude and latitude, but are treated as lengths";
         let job = |line: &str| Job::on(&[&file]).with("input", line);
         assert!(warnings(&job("").report()).contains(words), "{name}");
         assert!(!warnings(&job("crs = \"none\"").report()).contains(words), "{name}");

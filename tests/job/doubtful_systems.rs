@@ -30,7 +30,7 @@ fn keys_that_nothing_can_read_do_not_let_two_systems_pass() {
         [keys(&[[1024, 0, 1, 1], [2048, 0, 1, 4269], [3072, 0, 1, 32767], [3074, 0, 1, code], [3076, 0, 1, 9003]])]
     };
     told_apart(&of_code(10_131), &of_code(10_132), &["3074=10131", "3074=10132"]);
-    told_apart(&of_code(10_131), &[code(26915)], &["does not say its projection"]);
+    told_apart(&of_code(10_131), &[code(26915)], &["has no readable projection"]);
     let oblique = |doubles: [f64; 3]| {
         let projection = [[3072, 0, 1, 32767], [3074, 0, 1, 32767], [3075, 0, 1, 3], [3076, 0, 1, 9001]];
         let centre = [[3088, DOUBLES, 1, 1], [3089, DOUBLES, 1, 0], [3094, DOUBLES, 1, 2]];
@@ -171,13 +171,12 @@ fn what_the_user_says_is_not_called_a_record() {
     let file = write(folder.path(), "plain.las", &[]);
     for (choice, word) in [("EPSG:4326", "degrees"), ("EPSG:4978", "geocentric")] {
         let said = Job::on(&[&file]).with("input", &format!("crs = \"{choice}\"")).run();
-        said.refused(2, &[word, "in another CRS than [input] crs says"]);
+        said.refused(2, &[word, "in another CRS than [input] crs"]);
         assert!(!said.err.contains("record is wrong"), "{said:?}");
     }
     let degrees = write(folder.path(), "degrees.las", &[keys(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]])]);
     move_to_degrees(&degrees);
-    Job::on(&[&degrees]).run().refused(
-        2,
-        &["degrees.las: the coordinates are in degrees", "if the CRS record is wrong, say with [input] crs"],
-    );
+    Job::on(&[&degrees])
+        .run()
+        .refused(2, &["degrees.las: the coordinates are in degrees", "if the CRS record is wrong, set [input] crs"]);
 }

@@ -23,15 +23,15 @@ fn what_nobody_can_tell_is_not_taken_for_the_system_of_the_job() {
         ("unnamed.las", unnamed.clone(), ["names no CRS", "missing_crs"]),
         ("user.las", user.clone(), ["names no CRS", "missing_crs"]),
         ("json.las", json, ["not well-known text that can be read", "missing_crs"]),
-        ("mygrid.las", mygrid, ["My grid does not say its projection", "[input] crs says"]),
-        ("unknown.las", code(40_000), ["EPSG:40000 is not in the list of known codes", "[input] crs says"]),
+        ("mygrid.las", mygrid, ["My grid has no readable projection", "set [input] crs"]),
+        ("unknown.las", code(40_000), ["EPSG:40000 is not in the list of known codes", "set [input] crs"]),
     ] {
         let job = Job::on(&[las(name, record)]).with("input", "to_crs = \"EPSG:26915\"");
         job.run().refused(2, &[&[name], &words[..]].concat());
     }
     let turned: Vec<[f64; 3]> = places(0).into_iter().map(|[x, y, z]| [x.to_radians(), y.to_radians(), z]).collect();
     let radians = las_of(folder.path(), &turned, "radians.las", &[radians], 1e-9);
-    let words = ["radians.las", "key 2054, the unit of longitude and latitude", "[input] crs says"];
+    let words = ["radians.las", "key 2054, the unit of longitude and latitude", "set [input] crs"];
     Job::on(&[radians]).with("input", "to_crs = \"EPSG:26915\"").run().refused(2, &words);
     // What is missing may be said.
     let expected = Job::on(&[las("good.las", code(26916))]).with("input", "to_crs = \"EPSG:26915\"").digest();
@@ -82,7 +82,7 @@ fn columns_of_degrees_are_no_coordinates_of_a_map_and_latitudes_end_at_the_poles
     fs::write(&swapped, fit).unwrap();
     for to in ["utm", "EPSG:26915"] {
         let lines = format!("missing_crs = \"EPSG:4269\"\nto_crs = \"{to}\"");
-        Job::on(&[&swapped]).with("input", &lines).run().refused(2, &["swapped.csv", "beyond 90 degrees", "exchanged"]);
+        Job::on(&[&swapped]).with("input", &lines).run().refused(2, &["swapped.csv", "end at 90 degrees", "exchanged"]);
     }
     let lengths = write("lengths.csv", "x [m],y [m],z [m]", [0, 1]);
     let lines = "missing_crs = \"EPSG:4269\"\nto_crs = \"EPSG:3857\"\ndatums = \"close\"";

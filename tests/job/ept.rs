@@ -58,7 +58,7 @@ fn an_interrupted_job_goes_on_unless_the_data_set_has_changed() {
     assert_eq!(job.run().code, 1);
     job.calm();
     let said = job.run_with(&["--json"]).succeeded();
-    assert!(said.err.contains("going on"), "{}", said.err);
+    assert!(said.err.contains("continuing"), "{}", said.err);
     assert_eq!(results(&said.json()), results(&expected));
     // One point less, which only the hierarchy and a node tell.
     let allowed = || Job::on(&[&index]).tiles_of(2000).with("input", "max_malformed_fraction = 0.001");

@@ -29,7 +29,7 @@ struct Expected {
 
 const FOOT: f64 = 0.3048;
 const US_FOOT: f64 = 1200.0 / 3937.0;
-const NO_UNIT: &str = "no file says it";
+const NO_UNIT: &str = "not stated by the files";
 const METRES: &str = "metre in x and y, metre in z";
 /// No record says the unit of heights.
 const METRES_IN_XY: &str = "metre in x and y";
@@ -172,8 +172,9 @@ fn configurations_of_real_clouds_run_as_they_are_and_say_what_they_are() {
 
         let flat = configuration.replace("\n# ", " ");
         let has_heights = expected.unit == NO_UNIT || expected.unit.ends_with(" in z");
-        assert_eq!(flat.contains("nothing says the unit of z"), !has_heights, "{what}");
-        let unit = if expected.unit == NO_UNIT { "Unit: no file says it" } else { &format!("Unit: {}", expected.unit) };
+        assert_eq!(flat.contains("the unit of z is unknown"), !has_heights, "{what}");
+        let unit =
+            if expected.unit == NO_UNIT { "Unit: no file states it" } else { &format!("Unit: {}", expected.unit) };
         assert!(text(&new["unit"]).contains(expected.unit) && flat.contains(unit), "{} {what}", new["unit"]);
         let place = fs::read(folder.path().join("out/georeference.json")).unwrap();
         let place: Value = serde_json::from_slice(&place).unwrap();
@@ -329,18 +330,18 @@ fn a_configuration_is_replaced_only_if_that_is_asked_for() {
     fs::write(&path, "mine").unwrap();
     for arguments in [&["clouds"][..], &["clouds", "--force"]] {
         let said = init(folder.path(), arguments);
-        said.refused(2, &["job.toml exists already and is no configuration"]);
+        said.refused(2, &["job.toml exists already and is not a configuration"]);
         assert!(!said.err.contains("--force") && fs::read_to_string(&path).unwrap() == "mine", "{said:?}");
     }
     let cloud = fs::read(folder.path().join("clouds/a.laz")).unwrap();
-    init(folder.path(), &["clouds/a.laz", "--force", "-o", "clouds/a.laz"]).refused(2, &["no configuration"]);
+    init(folder.path(), &["clouds/a.laz", "--force", "-o", "clouds/a.laz"]).refused(2, &["not a configuration"]);
     assert!(fs::read(folder.path().join("clouds/a.laz")).unwrap() == cloud, "the cloud stays");
     fs::write(&path, "[input]\nfiles = []\n").unwrap();
     init(folder.path(), &["clouds"]).refused(2, &["job.toml exists already", "--force"]);
     init(folder.path(), &["clouds", "--force"]).succeeded();
     assert!(fs::read_to_string(&path).unwrap().contains("clouds/a.laz"));
-    init(folder.path(), &["clouds", "--output", "clouds"]).refused(2, &["no regular file"]);
-    init(folder.path(), &["clouds", "--output", "no/job.toml"]).refused(2, &["make it first"]);
+    init(folder.path(), &["clouds", "--output", "clouds"]).refused(2, &["not a regular file"]);
+    init(folder.path(), &["clouds", "--output", "no/job.toml"]).refused(2, &["create it first"]);
     init(folder.path(), &["nothing.laz"]).refused(2, &["exists already"]);
     init(folder.path(), &["nothing.laz", "-o", "-"]).refused(2, &["there is no file nothing.laz"]);
     init(folder.path(), &["-o", "-"]).refused(2, &["has no point clouds", "clouds, which has some"]);

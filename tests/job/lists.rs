@@ -100,7 +100,7 @@ fn an_interrupted_job_notices_a_list_that_has_changed() {
     };
     let job = interrupted();
     fs::write(&text, "# the same files\nclouds/a.csv\nclouds/b.csv\n").unwrap();
-    assert!(job.run().succeeded().err.contains("going on"));
+    assert!(job.run().succeeded().err.contains("continuing"));
     let job = interrupted();
     fs::write(&text, "clouds/a.csv\nclouds/b.csv\nclouds/c.csv\n").unwrap();
     let said = job.run().succeeded();
@@ -115,7 +115,7 @@ fn what_is_wrong_with_a_list_is_named_with_its_item() {
         fs::write(&vpc, text).unwrap();
         Job::on(&[&vpc]).run().refused(3, words);
     };
-    refused("{", &["list.vpc: is no list of point clouds in JSON"]);
+    refused("{", &["list.vpc: is not a readable JSON list of point clouds"]);
     refused(&list(&[]), &["list.vpc: is a list that names no point cloud"]);
     let mut image = item("north", 0);
     image["assets"] = json!({"data": {"href": "north.tif", "roles": ["data"]}});

@@ -186,7 +186,7 @@ fn a_sample_never_goes_into_a_pipe_or_a_directory() {
     std::fs::create_dir(folder.path().join("folder.las")).unwrap();
     for name in ["pipe.laz", "folder.las"] {
         for arguments in [&["sample", name, "--overwrite"][..], &["sample", name]] {
-            gdt_batch(folder.path(), arguments).refused(2, &[name, "is no regular file", "give another name"]);
+            gdt_batch(folder.path(), arguments).refused(2, &[name, "is not a regular file", "choose another name"]);
         }
     }
     assert!(pipe.exists());

@@ -219,7 +219,7 @@ fn mistyped_commands_and_options_get_a_suggestion() {
     }
     fs::write(folder.path().join("points.dat"), "1 2 3\n4 5 6\n").unwrap();
     gdt_batch(folder.path(), &["points.dat"])
-        .refused(2, &["points.dat: line 1", "a text of points ends in .csv, .txt"]);
+        .refused(2, &["points.dat: line 1", "a text file of points ends in .csv, .txt"]);
     assert!(!folder.path().join("out").exists() && !folder.path().join("a-terrain").exists());
     // A file or a folder that is called like a mistyped command is meant.
     fs::create_dir(folder.path().join("chek")).unwrap();

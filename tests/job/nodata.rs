@@ -104,7 +104,7 @@ fn one_number_for_nodata_is_left_out() {
     let report = Job::on(&[files.text("-9999", |i| i == 804)]).report();
     assert_eq!(number(&report["points"]["nodata"]), 1);
     assert!(
-        warnings(&report).contains("line 805 has the height -9999, far from all others: taken for nodata"),
+        warnings(&report).contains("line 805 has the height -9999, far from all others: treated as nodata"),
         "{report}"
     );
 }

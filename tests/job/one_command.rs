@@ -132,7 +132,7 @@ fn the_written_configuration_has_the_flags_and_offers_none_of_them_again() {
     // A configuration is replaced only if that is asked for.
     let write = |more: &[&str]| gdt_batch(root, &[&["degrees.csv", "--write-config", "job.toml"], more].concat());
     write(&[]).succeeded();
-    write(&[]).refused(2, &["job.toml exists already: give another name, or add --force"]);
+    write(&[]).refused(2, &["job.toml exists already: choose another name, or add --force"]);
     write(&["--force"]).succeeded();
     let said = gdt_batch(root, &["degrees.csv", "--write-config", "-", "--json"]);
     said.refused(2, &["--json"]);
@@ -230,7 +230,7 @@ fn a_run_that_was_killed_goes_on_with_the_same_command() {
             killed.args(words).args(["-o", "killed"]).env("GDT_FAULT", fault).current_dir(root);
             assert_eq!(killed.output().unwrap().status.code(), None, "{fault}");
             let said = gdt_batch(root, &[words, &["-o", "killed"]].concat()).succeeded();
-            assert!(fault != "tile:1" || said.err.contains("going on with an interrupted run"), "{said:?}");
+            assert!(fault != "tile:1" || said.err.contains("continuing an interrupted run"), "{said:?}");
             assert_eq!(results(&root.join("killed")), results(&root.join("whole")), "{words:?} {fault}");
             assert!(!root.join("killed/job").exists());
         }
@@ -241,5 +241,5 @@ fn a_run_that_was_killed_goes_on_with_the_same_command() {
 fn a_url_that_cannot_be_read_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let said = gdt_batch(folder.path(), &["ftp://x/a.laz"]);
-    said.refused(2, &["files are read by https://, http:// and s3://, not by ftp://"]);
+    said.refused(2, &["files can be read by https://, http:// and s3://, not by ftp://"]);
 }

@@ -84,7 +84,7 @@ fn vertices_have_the_colours_of_an_orthophoto_in_any_tiles() {
     assert_eq!(colors(&job), expected(100));
     job.verified();
     std::fs::write(&photo, "no picture").unwrap();
-    job.run().refused(3, &["photo.tif", "[output] color", "no GeoTIFF"]);
+    job.run().refused(3, &["photo.tif", "[output] color", "not a readable GeoTIFF"]);
     std::fs::remove_file(&photo).unwrap();
     job.run().refused(2, &["[output] color: there is no file", "photo.tif"]);
 }

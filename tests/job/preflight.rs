@@ -27,7 +27,7 @@ fn a_job_refused_for_disk_or_memory_may_be_retried_and_one_below_a_file_not() {
         (
             Preflight { disk_free: Some(need - 1), ..preflight.clone() },
             ErrorKind::Retry,
-            ["make room or choose another", "--force"],
+            ["free some space or choose another", "--force"],
         ),
         (
             Preflight { memory_free: Some(1 << 20), ..preflight.clone() },
@@ -83,7 +83,7 @@ fn bomb() -> Vec<u8> {
     bytes
 }
 
-/// They stay until the new ones are whole, so their room is not free.
+/// They are kept until the new ones are complete, so their room is not free.
 #[test]
 fn the_results_of_an_earlier_job_do_not_count_as_room_on_the_disk() {
     let folder = tempfile::tempdir().unwrap();
@@ -96,7 +96,7 @@ fn the_results_of_an_earlier_job_do_not_count_as_room_on_the_disk() {
     // And the report.
     assert!((written..written + 20_000).contains(&earlier), "{earlier} instead of {written}");
     let text = job.run_with(&["check"]).succeeded().out;
-    assert!(text.contains("stay until the new ones are whole"), "{text}");
+    assert!(text.contains("are kept until the new ones are complete"), "{text}");
 }
 
 #[test]
@@ -110,8 +110,8 @@ fn a_job_larger_than_the_disk_is_refused_unless_forced() {
     let [need, free] = ["disk", "disk_free"].map(|name| number(&check.json()[name]));
     assert!(need > 100 << 30, "{need}");
     if need > free {
-        check.refused(1, &["make room", "--force"]);
-        lenient.run().refused(1, &["make room", "--force"]);
+        check.refused(1, &["free some space", "--force"]);
+        lenient.run().refused(1, &["free some space", "--force"]);
     }
     assert!(!lenient.out().exists(), "a refused job writes nothing");
     job.run_with(&["--force"]).refused(3, &["bomb.laz", "only 1000 points"]);
@@ -201,7 +201,7 @@ fn a_job_on_a_small_part_of_a_cloud_larger_than_the_disk_is_not_refused() {
     let [need, free] = ["disk", "disk_free"].map(|name| number(&check("").json()[name]));
     assert!(need > 80 << 30, "{need}");
     if need > free {
-        check("").refused(1, &["make room"]);
+        check("").refused(1, &["free some space"]);
         // The headers do not tell how much the bounds leave. The more it takes to know, the larger the sample.
         let part = check("bounds = [500000, 500000, 600000, 600000]").succeeded().json();
         assert!(number(&part["disk"]) <= free && number(&part["kept"]) < count as u64 / 20, "{part}");

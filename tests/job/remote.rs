@@ -183,7 +183,7 @@ fn a_server_that_fails_for_ever_does_not_hold_a_job_up() {
     run(Answer::CutOff(10)).refused(1, &[&url, "bytes too early"]);
     run(Answer::Tagged("second")).refused(1, &["it has changed while it was in use", "\"first\"", "\"second\""]);
     run(Answer::Status(412, "X: y")).refused(1, &["it has changed while it was in use"]);
-    run(Answer::Status(403, "X: y")).refused(1, &["403", "a signature, that may have expired"]);
+    run(Answer::Status(403, "X: y")).refused(1, &["403", "a signature in the URL may have expired"]);
 }
 
 #[test]
@@ -204,7 +204,7 @@ fn what_no_server_can_hand_out_is_refused() {
     }
     refused("gs://bucket/a.laz", 2, &["not by gs://"]);
     refused("http://127.0.0.1:1/a.laz", 1, &["127.0.0.1:1 refuses connections"]);
-    refused("https://no-such-host.invalid/a.laz", 1, &["no-such-host.invalid", "look after the network"]);
+    refused("https://no-such-host.invalid/a.laz", 1, &["no-such-host.invalid", "check the network"]);
     server.answer(|_, _| Answer::Whole);
     refused(&server.url("/a/cloud.las"), 2, &["does not send parts", "download the file"]);
     server.answer(|_, _| Answer::Status(401, "X: y"));
@@ -308,7 +308,7 @@ fn buckets_are_listed_and_requests_signed() {
     with_key("s3://bucket/clouds/").run().refused(2, &["is a folder", "s3://bucket/clouds/*.laz"]);
     with_key("s3://bucket/clouds/x.laz").run().refused(2, &["there is no file s3://bucket/clouds/x.laz", "404"]);
     server.answer(|_, _| list(&["clouds/c.laz"], true));
-    with_key("s3://bucket/clouds/*.laz").run().refused(2, &["the server repeats parts of the list of the bucket"]);
+    with_key("s3://bucket/clouds/*.laz").run().refused(2, &["the server repeats parts of the bucket's list"]);
     let nobody = job("s3://bucket/clouds/c.laz").variable("AWS_ACCESS_KEY_ID", "");
     nobody.run().refused(2, &["AWS_ACCESS_KEY_ID", "AWS_SKIP_SIGNATURE=true"]);
     server.answer(|_, _| Answer::Right);

@@ -483,7 +483,7 @@ fn a_finished_job_is_sent_only_to_start_it_over() {
         [("local", &[][..]), ("local", &["--dry-run"]), ("slurm", &["--dry-run"]), ("kubernetes", &["--dry-run"])]
     {
         let said = submit(engine, more).succeeded();
-        assert!(said.err.contains("nothing is sent, because the job is done"), "{engine}: {}", said.err);
+        assert!(said.err.contains("nothing was submitted, because the job is done"), "{engine}: {}", said.err);
         let expected = if more.is_empty() { "done: all results are in place" } else { "" };
         assert!(said.out.trim_end().ends_with(expected) && !said.out.contains("--phase"), "{}", said.out);
         assert_eq!(said.out.is_empty(), expected.is_empty(), "{}", said.out);

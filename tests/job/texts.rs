@@ -142,7 +142,7 @@ fn columns_named_as_degrees_that_hold_something_else_are_not_silent() {
     for (x, y) in [(1131.5, 4812.5), (115_000_000.0, 481_000_000.0)] {
         let texts = Texts::one(&format!("lon,lat,height\n{}", table(x, y, 1.0)));
         let said = warnings(&texts.job().report());
-        assert!(said.contains("are not degrees") && said.contains("read as lengths"), "{said}");
+        assert!(said.contains("are not degrees") && said.contains("treated as lengths"), "{said}");
     }
 }
 

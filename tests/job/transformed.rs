@@ -187,7 +187,7 @@ fn a_crs_for_files_without_one_and_for_those_with_a_false_one() {
         assert_eq!(warnings(&report).contains("overrides its CRS"), file == &wrong, "{report}");
     }
     job(&plain, "").run().refused(2, &["plain.las", "names no CRS", "missing_crs"]);
-    job(&plain, "crs = \"none\"").run().refused(2, &["to_crs needs to know"]);
+    job(&plain, "crs = \"none\"").run().refused(2, &["to_crs needs their CRS"]);
     // What is there already keeps its coordinates.
     let there = Job::on(&[&right]).with("input", "to_crs = \"EPSG:26916\"");
     assert_eq!(there.digest(), Job::on(&[&right]).digest());
@@ -210,7 +210,7 @@ fn shifts_of_datums_and_heights_are_refused_by_name() {
     to(&new, "to_crs = \"EPSG:32615\"").run().refused(2, &["NAD83", "WGS 84", "datums = \"close\""]);
     let close = to(&new, "to_crs = \"EPSG:32615\"\ndatums = \"close\"").report();
     assert!(warnings(&close).contains("no datum shift between NAD83 and WGS 84"), "{close}");
-    to(&new, "to_crs = \"EPSG:4326\"").run().refused(2, &["to_crs", "no map"]);
+    to(&new, "to_crs = \"EPSG:4326\"").run().refused(2, &["to_crs", "not a map"]);
     to(&new, "to_crs = \"EPSG:5513\"\ncrs = \"EPSG:4156\"").run().refused(2, &["Krovak"]);
     let heights = |name: &str| {
         let plane = crs("EPSG:26916").wkt.unwrap();
@@ -219,7 +219,7 @@ fn shifts_of_datums_and_heights_are_refused_by_name() {
     };
     let [navd, egm] = ["NAVD88 height", "EGM96 height"].map(heights);
     let job = Job::on(&[&navd, &egm]).with("input", "to_crs = \"EPSG:26915\"");
-    job.run().refused(2, &["NAVD88", "EGM96", "the grid of a geoid"]);
+    job.run().refused(2, &["NAVD88", "EGM96", "needs a geoid grid"]);
     to(&egm, "to_crs = \"EPSG:26915+5703\"").run().refused(2, &["EGM96", "[input] to_crs", "the datum of heights"]);
 }
 

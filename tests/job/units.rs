@@ -223,7 +223,7 @@ fn a_unit_of_length_over_columns_of_degrees_must_be_stated_twice() {
     let row =
         |i: usize| format!("{:.6},{:.6},{}\n", 11.5 + (i % 10) as f64 * 1e-4, 48.1 + (i / 10) as f64 * 1e-4, i % 3);
     fs::write(&path, format!("lon,lat,z\n{}", (0..60).map(row).collect::<String>())).unwrap();
-    let words = ["degrees.csv: its columns are named as degrees", "[input] unit says metre", "to_crs = \"utm\""];
+    let words = ["degrees.csv: its columns are named as degrees", "[input] unit is metre", "to_crs = \"utm\""];
     Job::on(&[&path]).with("input", "unit = \"metre\"").run().refused(2, &words);
     let (found, said) = metres(&[&path], "unit = \"metre\"\ncrs = \"none\"");
     assert_eq!(found, [1.0, 1.0]);
@@ -246,5 +246,5 @@ fn the_unit_of_a_record_without_a_system_is_that_of_the_plane_unless_the_user_st
         write(folder.path(), "false.las", &[keys(&[[1024, 0, 1, 3], [2048, 0, 1, 4978], [2052, 0, 1, 9002]])]);
     let (found, said) = metres(&[&geocentric], "");
     assert_eq!(found[0], 0.3048);
-    assert!(said.contains("x and y are a plane in foot"), "{said}");
+    assert!(said.contains("x and y are treated as a plane in foot"), "{said}");
 }

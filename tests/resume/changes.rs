@@ -137,7 +137,7 @@ fn restart_starts_over_also_under_its_old_name() {
     for name in ["--restart", "--fresh"] {
         assert!(rig.run_to("committed", 4).was_killed());
         let said = Run::start(rig.command().arg(name)).end().succeeded().err;
-        assert!(!said.contains("going on"), "{said}");
+        assert!(!said.contains("continuing"), "{said}");
         assert_eq!(said.contains("--fresh has a new name: --restart"), name == "--fresh", "{said}");
         assert_eq!(rig.is_complete(name)["resumed"], 0);
     }

@@ -132,7 +132,7 @@ fn a_job_whose_disk_was_full_at_any_stage_goes_on_when_there_is_room() {
             break;
         }
         assert_eq!(end.status.code(), Some(1), "{kibibytes} KiB: {end:?}");
-        assert!(end.out.contains("No space left") && end.out.contains("make room"), "{}", end.out);
+        assert!(end.out.contains("No space left") && end.out.contains("free some space"), "{}", end.out);
         places.insert(place(&end.out));
     }
     assert!(places.len() >= 4, "{places:?}");

@@ -33,7 +33,7 @@ fn run_in(directory: &Path, config: &str) -> End {
 #[track_caller]
 fn went_on(rig: &Rig, end: End, out: &Path, name: &str) {
     let said = end.succeeded().err;
-    assert!(said.contains("going on with an interrupted run") && !said.contains("starting over"), "{said}");
+    assert!(said.contains("continuing an interrupted run") && !said.contains("starting over"), "{said}");
     let found = files(out);
     assert!(found == rig.expected, "{:?}", found.keys());
     let report: Value = serde_json::from_slice(&fs::read(out.join("report.json")).unwrap()).unwrap();

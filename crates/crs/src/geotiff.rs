@@ -41,7 +41,7 @@ fn unit_of(keys: &GeoKeys, code: u16, size: u16) -> Option<f64> {
 /// Says what of the keys is there, but cannot be used.
 pub(crate) fn problems(keys: &GeoKeys) -> Vec<String> {
     let unit = keys.code(LINEAR_UNITS).filter(|_| linear_unit(keys).is_none()).map(|code| match code {
-        USER_DEFINED => format!("GeoTIFF key {LINEAR_UNIT_SIZE}, the unit of x and y, is no length"),
+        USER_DEFINED => format!("GeoTIFF key {LINEAR_UNIT_SIZE}, the unit of x and y, is not a length"),
         code => format!("GeoTIFF key {LINEAR_UNITS}, the unit of x and y, has the code {code}, which is not known"),
     });
     let height = keys.code(VERTICAL_UNITS).filter(|code| metres(*code).is_none());
@@ -54,15 +54,15 @@ pub(crate) fn problems(keys: &GeoKeys) -> Vec<String> {
     let of_code = || keys.code(GEOGRAPHIC_TYPE).and_then(|code| text_of_code(code.into()));
     let problem = match projected(keys) {
         Some(USER_DEFINED) => geotiff_text::problem(keys)
-            .or_else(|| Some("the GeoTIFF keys do not say its projection or its datum".into())),
+            .or_else(|| Some("the GeoTIFF keys do not define its projection or its datum".into())),
         None if is_geographic => geotiff_text::problem_of_angles(keys, of_code()).or_else(|| {
             let code = keys.code(GEOGRAPHIC_TYPE).filter(|code| *code != USER_DEFINED);
-            Some(code.map_or_else(|| "the GeoTIFF keys do not say its datum".into(), not_in_list))
+            Some(code.map_or_else(|| "the GeoTIFF keys do not define its datum".into(), not_in_list))
         }),
         code => code.map(not_in_list),
     };
     let projection = problem.filter(|_| is_unknown);
-    let projection = projection.map(|what| format!("nobody can tell where its coordinates are: {what}"));
+    let projection = projection.map(|what| format!("the place of its coordinates is unknown: {what}"));
     unit.into_iter().chain(height).chain(projection).chain(other_unit(keys)).collect()
 }
 
@@ -72,7 +72,7 @@ fn other_unit(keys: &GeoKeys) -> Option<String> {
     let (own, of_code) = (Unit::from_metres(linear_unit(keys)), from_epsg(code.into())?.horizontal);
     (own != Unit::Unknown && own != of_code).then(|| {
         format!(
-            "GeoTIFF key {LINEAR_UNITS}, the unit of x and y, says {}, and EPSG:{code} has them in {}: that of the key is used",
+            "GeoTIFF key {LINEAR_UNITS}, the unit of x and y, is {}, but EPSG:{code} has {}: that of the key is used",
             own.name(),
             of_code.name()
         )

@@ -150,7 +150,7 @@ fn longitude_and_latitude_may_be_defined_by_keys() {
     assert!(problems(&keys).is_empty());
     // Without an ellipsoid, nobody can tell.
     let keys = records(&[[1024, 0, 1, 2], [2048, 0, 1, USER_DEFINED]], &[]);
-    assert!(problems(&keys)[0].contains("do not say its datum"));
+    assert!(problems(&keys)[0].contains("do not define its datum"));
 }
 
 #[test]
@@ -195,9 +195,9 @@ fn projections_that_only_codes_and_methods_define_are_told_apart_by_their_keys()
     let of_code = |code| user_defined(&[[3074, 0, 1, code]], &[]);
     assert!(of_code(10_131).same_as(&of_code(10_131)) && of_code(10_131).is_named());
     let found = of_code(10_131).differences(&of_code(10_132));
-    assert_eq!(found, ["what defines the projection (GeoTIFF key 3074=10131, GeoTIFF key 3074=10132)"]);
+    assert_eq!(found, ["the definition of the projection (GeoTIFF key 3074=10131, GeoTIFF key 3074=10132)"]);
     let utm = from_epsg(26915).unwrap();
-    assert!(utm.differences(&of_code(10_131))[0].contains("does not say its projection"));
+    assert!(utm.differences(&of_code(10_131))[0].contains("has no readable projection"));
     // An oblique Mercator projection.
     let oblique = |doubles: &[f64]| {
         let keys = [[3088, DOUBLES, 1, 0], [3089, DOUBLES, 1, 1], [3094, DOUBLES, 1, 2]];
@@ -206,7 +206,7 @@ fn projections_that_only_codes_and_methods_define_are_told_apart_by_their_keys()
     };
     assert!(oblique(&[7.4, 46.9, 90.0]).same_as(&oblique(&[7.4, 46.9, 90.0])));
     let found = oblique(&[7.4, 46.9, 90.0]).differences(&oblique(&[1.4, 40.0, 50.0]));
-    assert_eq!(found, ["what defines the projection (GeoTIFF key 3088=7.4, GeoTIFF key 3088=1.4)"]);
+    assert_eq!(found, ["the definition of the projection (GeoTIFF key 3088=7.4, GeoTIFF key 3088=1.4)"]);
     // The name of both is the citation.
     let cited = |code| user_defined(&[[3074, 0, 1, code], [3073, TEXTS, 8, 0]], &[]);
     assert!(!cited(10_131).same_as(&cited(10_132)));

@@ -29,7 +29,7 @@ impl Crs {
             None => Some("it names no projection".into()),
             Some(read) => read.err(),
         });
-        let projection = projection.map(|what| format!("nobody can tell where its coordinates are: {what}"));
+        let projection = projection.map(|what| format!("the place of its coordinates is unknown: {what}"));
         let code = self.difference_to_code().map(|what| {
             let code = self.epsg.unwrap_or_default();
             format!("its text and its code EPSG:{code} differ in {what}; the text is used")
@@ -113,7 +113,7 @@ mod tests {
             ("500000.0", "\"east\"", "its False_Easting is no number"),
             ("0.9996", "inf", "its Scale_Factor is no number"),
         ] {
-            assert_eq!(problems(from, to), [format!("nobody can tell where its coordinates are: {what}")], "{to}");
+            assert_eq!(problems(from, to), [format!("the place of its coordinates is unknown: {what}")], "{to}");
         }
         let cone = |parameters: &str| {
             let text = UTM.replace("Transverse_Mercator", "Lambert_Conformal_Conic_2SP");

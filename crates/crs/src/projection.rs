@@ -241,7 +241,7 @@ fn missing(name: &str, method: &str, parameters: &BTreeMap<String, f64>) -> Opti
 /// Says which two parameters contradict each other, if two do.
 fn contradiction(method: &str, parameters: &BTreeMap<String, f64>, system: &WktNode) -> Option<String> {
     if let Some(words) = extension(system).filter(|_| method == "merc" && is_spherical_extension(system)) {
-        return Some(format!("its extension ({words}) is a projection that is not known here"));
+        return Some(format!("its extension ({words}) is an unknown projection"));
     }
     let (parallel, scale) = (parameters.get("lat_1")?, parameters.get("k_0")?);
     // Some writers give a scale of 1 beside the parallel, which says the scale.

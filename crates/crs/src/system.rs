@@ -118,9 +118,9 @@ impl Crs {
         match (self.epsg, self.kind) {
             (Some(code), _) if text_of_code(code).is_none() => format!("EPSG:{code} is not in the list of known codes"),
             (_, CrsKind::Geographic) => {
-                format!("{} does not say its datum or its unit of angles in a way that can be read", self.label())
+                format!("{} has no readable datum or angular unit", self.label())
             }
-            _ => format!("{} does not say its projection in a way that can be read", self.label()),
+            _ => format!("{} has no readable projection", self.label()),
         }
     }
 
@@ -287,7 +287,7 @@ impl<'a> ComparableCrs<'a> {
             if own != others && !own.is_empty() && !others.is_empty() {
                 let (first, second) = (only(&own, &others), only(&others, &own));
                 let (first, second) = (first.unwrap_or_else(lost), second.unwrap_or_else(lost));
-                return Some(format!("what defines the projection ({first}, {second})"));
+                return Some(format!("the definition of the projection ({first}, {second})"));
             }
             if own == others && !own.is_empty() {
                 return None;
@@ -430,7 +430,7 @@ mod tests {
             .unwrap()
         };
         assert!(text(1).same_as(&text(1)));
-        assert_eq!(text(1).differences(&text(2)), ["what defines the projection (x_0 = 1, x_0 = 2)"]);
+        assert_eq!(text(1).differences(&text(2)), ["the definition of the projection (x_0 = 1, x_0 = 2)"]);
     }
 
     #[test]

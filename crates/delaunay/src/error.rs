@@ -23,7 +23,7 @@ pub enum Error {
         point: usize,
     },
     /// The resolution is no positive number.
-    #[error("the resolution is no positive number")]
+    #[error("the resolution is not a positive number")]
     Resolution,
     /// A guarantee of this library does not hold.
     #[error("{0}")]

@@ -26,7 +26,7 @@ pub enum Error {
     TooEarly(String),
     /// A job stopped, and its complete phases are kept.
     #[error(
-        "{why}\nwhat is done is kept in {} (phases complete: {phases}): {}, without --restart, to go on",
+        "{why}\nwhat is done is kept in {} (phases complete: {phases}): {}, without --restart, to continue",
         name(job),
         again(why)
     )]
@@ -40,7 +40,7 @@ pub enum Error {
     },
     /// What was read is other than the plan claims: a header is wrong, or a file bad that is to be left out. All inputs are measured, and the
     /// job starts again. A user sees this only if an input changes in between.
-    #[error("an input has changed while the job read it: run again")]
+    #[error("an input changed while the job read it: run again")]
     OtherThanClaimed {
         /// Whether a file is bad, not a header wrong.
         is_bad_file: bool,

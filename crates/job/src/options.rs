@@ -75,7 +75,7 @@ pub struct RunOptions {
     pub progress: ProgressOutput,
     /// Whether to run though the disk or the memory seems too small.
     pub force: bool,
-    /// Whether to start over instead of going on with an interrupted run.
+    /// Whether to start over instead of continuing an interrupted run.
     pub restart: bool,
     /// Whether to do only what has changed since the last run, and to keep what the next one needs for that.
     pub update: bool,

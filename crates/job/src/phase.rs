@@ -127,9 +127,13 @@ impl Task {
                 let count = match (count, first) {
                     (Some(count), _) => count,
                     (None, 1) => slurm_count(&variable)?,
-                    _ => return Err(Error::Config(format!("{name} is {text}, but of how many tasks? Add --tasks N"))),
+                    _ => {
+                        return Err(Error::Config(format!(
+                            "{name} is {text}, but the number of tasks is missing: add --tasks N"
+                        )));
+                    }
                 };
-                let text = format!("{name} is {text}, and there are {count} tasks: they count from {first}");
+                let text = format!("{name} is {text}, and there are {count} tasks: their numbers begin at {first}");
                 return number
                     .checked_sub(first)
                     .map_or(Err(()), |before| Task::new(before + 1, count))
@@ -159,13 +163,13 @@ fn slurm_count(variable: impl Fn(&str) -> Option<String>) -> Result<u32> {
     match (most, count) {
         (Some(most), Some(count)) if most == count => Ok(most),
         _ => Err(Error::Config(
-            "the array of Slurm is not one from 1 to the number of tasks: say how many there are with --tasks N".into(),
+            "the array of Slurm is not one from 1 to the number of tasks: set their number with --tasks N".into(),
         )),
     }
 }
 
 fn number_of(name: &str, text: &str) -> Result<u32> {
-    text.parse().map_err(|_| Error::Config(format!("{name} is {text:?}, which is no number")))
+    text.parse().map_err(|_| Error::Config(format!("{name} is {text:?}, which is not a number")))
 }
 
 impl FromStr for Task {

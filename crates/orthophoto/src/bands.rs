@@ -48,17 +48,17 @@ impl Bands {
         let (bits, formats, extra) =
             (numbers(Tag::BitsPerSample)?, numbers(Tag::SampleFormat)?, numbers(Tag::ExtraSamples)?);
         if bits.iter().any(|bits| *bits != 8) || bits.is_empty() || formats.iter().any(|format| *format != 1) {
-            return Err("its bands are not of eight bits without sign: make them so, for example with `gdal_translate -ot Byte -scale`".into());
-        }
-        if photometric == PALETTE {
             return Err(
-                "it has a palette: make a picture in colours of it, for example with `gdal_translate -expand rgb`"
+                "its bands are not unsigned 8-bit: convert them, for example with `gdal_translate -ot Byte -scale`"
                     .into(),
             );
         }
+        if photometric == PALETTE {
+            return Err("it has a palette: convert it to RGB, for example with `gdal_translate -expand rgb`".into());
+        }
         if !COMPRESSIONS.contains(&compression) {
             return Err(format!(
-                "it is compressed in a way that is not read ({compression}): use another one, for example with `gdal_translate -co \
+                "its compression is not supported ({compression}): use another one, for example with `gdal_translate -co \
                  COMPRESS=DEFLATE`"
             )
             .into());
@@ -67,12 +67,14 @@ impl Bands {
         let is_ycbcr = photometric == YCBCR;
         let is_known = [BLACK_IS_ZERO, RGB].contains(&photometric) || (is_ycbcr && is_jpeg);
         if !is_known {
-            return Err(
-                format!("its colours are of a kind that is not read ({photometric}): grey, RGB and RGBA are").into()
-            );
+            return Err(format!("its colour type is not supported ({photometric}), only grey, RGB and RGBA").into());
         }
         if planar == PLANAR && count > 1 {
-            return Err("its bands are in planes of their own: put them side by side, for example with `gdal_translate -co INTERLEAVE=PIXEL`".into());
+            return Err(
+                "its bands are stored in separate planes: interleave them, for example with `gdal_translate -co \
+                        INTERLEAVE=PIXEL`"
+                    .into(),
+            );
         }
         let count = usize::from(count);
         let first_extra = count.saturating_sub(extra.len());

@@ -154,7 +154,7 @@ impl Chunks {
         if !self.bands.is_jpeg {
             return match image.read_chunk(number)? {
                 DecodingResult::U8(bytes) => Ok(Chunk { width: width as usize, bytes }),
-                _ => Err("it has other numbers than the tags say".into()),
+                _ => Err("its data type differs from its tags".into()),
             };
         }
         if count > self.most_bytes {

@@ -80,7 +80,7 @@ pub(crate) fn if_there<T: Default>(found: TiffResult<T>) -> std::result::Result<
 pub fn require_file(path: &Path) -> Result<()> {
     match path.metadata() {
         Ok(found) if found.is_file() => Ok(()),
-        Ok(_) => Err(Error::Config(format!("[output] color: {} is no file: name one GeoTIFF", path.display()))),
+        Ok(_) => Err(Error::Config(format!("[output] color: {} is not a file: name one GeoTIFF", path.display()))),
         Err(error) if error.kind() == ErrorKind::NotFound => {
             Err(Error::Config(format!("[output] color: there is no file {}: correct its name", path.display())))
         }

@@ -34,14 +34,14 @@ impl PixelGrid {
             }
             (_, _, &[a, b, _, x, d, e, _, y, ..]) => PixelGrid { corner: [x, y], column: [a, d], row: [b, e] },
             _ => {
-                return Err("it does not say where it is: it has neither ModelTiepoint and ModelPixelScale nor ModelTransformation. Make a \
-                            GeoTIFF of it, for example with `gdal_translate`, which reads a world file beside it"
+                return Err("it is not georeferenced: it has neither ModelTiepoint and ModelPixelScale nor ModelTransformation. Convert \
+                            it to a GeoTIFF, for example with `gdal_translate`, which reads a world file next to it"
                     .into());
             }
         };
         let numbers = grid.corner.iter().chain(&grid.column).chain(&grid.row);
         if !numbers.clone().all(|number| number.is_finite()) || grid.area() == 0.0 {
-            return Err("what it says of where it is are no numbers of a place: georeference it again".into());
+            return Err("its georeference is invalid: georeference it again".into());
         }
         let is_point = keys
             .chunks_exact(4)
@@ -100,12 +100,14 @@ pub(crate) fn way(points: &Crs, photo: &Crs, warnings: &mut Warnings) -> Result<
         return Ok(None);
     }
     let way = CrsTransform::between(&from, &to, DatumRule::Close).map_err(|why| {
-        format!("its colours cannot be brought to the points: {why}; transform it, for example with `gdalwarp -t_srs`")
+        format!(
+            "it cannot be transformed to the CRS of the points: {why}; reproject it, for example with `gdalwarp -t_srs`"
+        )
     })?;
     match way.datums() {
         DatumNote::Same => {}
         DatumNote::Assumed(names) | DatumNote::TakenAlike(names) => {
-            warnings.push(format!("{names} are taken for one datum, so colours may be a metre or two off"));
+            warnings.push(format!("{names} are treated as one datum, so colours may be a metre or two off"));
         }
     }
     Ok(Some(way))
@@ -114,9 +116,9 @@ pub(crate) fn way(points: &Crs, photo: &Crs, warnings: &mut Warnings) -> Result<
 /// Says which CRS is missing, if one is.
 fn missing(points: &Crs, photo: &Crs) -> Option<String> {
     match (points.is_named(), photo.is_named()) {
-        (true, false) => Some(format!("it says no CRS: it is taken to be in that of the points, {}", points.label())),
+        (true, false) => Some(format!("it has no CRS: that of the points is assumed, {}", points.label())),
         (false, true) => {
-            Some(format!("it is in {}, and the points say no CRS: they are taken to be in the same", photo.label()))
+            Some(format!("it is in {}, and the points have no CRS: the same is assumed for them", photo.label()))
         }
         _ => None,
     }

@@ -21,10 +21,10 @@ pub(crate) fn decode(tables: &[u8], piece: &[u8], size: [usize; 3], is_ycbcr: bo
         .set_max_height(height);
     let mut headers = JpegDecoder::new_with_options(ZCursor::new(&data), options);
     headers.decode_headers().map_err(|e| e.to_string())?;
-    let stored = headers.input_colorspace().ok_or("it says no colours")?;
+    let stored = headers.input_colorspace().ok_or("it has no colour space")?;
     let wanted = if is_ycbcr && bands == 3 { ColorSpace::RGB } else { stored };
     if headers.dimensions() != Some((width, height)) || wanted.num_components() != bands {
-        return Err(format!("it is no picture of {width} x {height} pixels with {bands} bands, as the tags say"));
+        return Err(format!("it is not a picture of {width} x {height} pixels with {bands} bands, as the tags say"));
     }
     JpegDecoder::new_with_options(ZCursor::new(&data), options.jpeg_set_out_colorspace(wanted))
         .decode()

@@ -12,7 +12,7 @@ use sys::{Result, Warnings, interrupt};
 use tiff::decoder::Decoder;
 
 /// What is wrong with other files.
-const NO_GEOTIFF: &str = "it is no GeoTIFF that can be read";
+const NO_GEOTIFF: &str = "it is not a readable GeoTIFF";
 
 /// An orthophoto, open to be asked for colours. Threads may share it.
 #[derive(Debug)]

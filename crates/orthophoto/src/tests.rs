@@ -215,9 +215,9 @@ fn what_cannot_be_read_is_refused_with_a_way_out() {
     let path = folder.path().join("photo.tif");
     let none = Crs::default();
     std::fs::write(&path, "no picture").unwrap();
-    assert!(refusal(&path, &none, LARGE).contains("no GeoTIFF"));
+    assert!(refusal(&path, &none, LARGE).contains("not a readable GeoTIFF"));
     write::<RGB8>(&path, Compression::Uncompressed, &[], &rgb());
-    assert!(refusal(&path, &none, LARGE).contains("does not say where it is"));
+    assert!(refusal(&path, &none, LARGE).contains("is not georeferenced"));
     write::<Gray16>(&path, Compression::Uncompressed, &PLACE, &vec![1; (COLUMNS * ROWS) as usize]);
     assert!(refusal(&path, &none, LARGE).contains("-ot Byte"));
     write::<RGB8>(&path, Compression::Uncompressed, &PLACE, &rgb());

@@ -27,7 +27,8 @@ pub(crate) fn zone_of_middle(sources: &[Source], said: &[Crs], options: &InputOp
         let most = if is_wide(&claimed) { source.rectangle_of_most()? } else { None };
         if most.is_none() && is_around_the_earth(source, crs) {
             return Err(refuse(&format!(
-                "the longitudes of {} reach from {} to {}, around more than half of the earth, so the middle of its box says nothing: its \
+                "the longitudes of {} reach from {} to {}, around more than half of the earth, so the middle of its box is meaningless: \
+                 its \
                  points may lie on both sides of the date line, or one of them is a mistake; name the zone, such as \"EPSG:32601\"",
                 source.path.display(),
                 source.min[0],
@@ -37,7 +38,7 @@ pub(crate) fn zone_of_middle(sources: &[Source], said: &[Crs], options: &InputOp
         places.extend(most.map_or(claimed, |most| places_within(most, &way)));
     }
     let middle = middle(&mut places)
-        .ok_or_else(|| refuse("no header says where the points lie; name the zone, such as \"EPSG:32615\""))?;
+        .ok_or_else(|| refuse("no header gives the position of the points; name the zone, such as \"EPSG:32615\""))?;
     let mut known = HashSet::new();
     let distinct = said.iter().filter(|crs| known.insert(format!("{crs:?}")));
     let (mut codes, mut zone) = (HashSet::new(), None);

@@ -182,8 +182,8 @@ impl InputOptions {
         let is_other = |class: &&u8| self.surface.classes().is_some_and(|ground| !ground.contains(class));
         if let Some(class) = self.classes.iter().flatten().find(is_other) {
             return Some(format!(
-                "surface = \"ground\" keeps ground and water (classes 2, 8, 9 and 20), and class {class} in classes is neither: leave out \
-                 one of both keys"
+                "surface = \"ground\" keeps ground and water (classes 2, 8, 9 and 20), and class {class} in classes is neither: leave \
+                 out one of the two keys"
             ));
         }
         if self.bare_earth != GroundSizes::default() && !self.finds_ground() {
@@ -191,7 +191,7 @@ impl InputOptions {
         }
         let returns = self.surface.returns();
         let is_open = [returns, self.returns].contains(&KeptReturns::All) || returns.is_same(self.returns);
-        (!is_open).then(|| "surface and returns choose different returns: leave out one of both keys".into())
+        (!is_open).then(|| "surface and returns choose different returns: leave out one of the two keys".into())
     }
 
     /// Tells whether the job needs the numbers of points, to know which was read first.

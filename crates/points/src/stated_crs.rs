@@ -18,7 +18,7 @@ pub(crate) fn stated_crs(source: &Source, all: &[Source], options: &InputOptions
         CrsChoice::Given { crs, .. } => (**crs).clone(),
         CrsChoice::None => {
             return Err(Error::Config(
-                "[input] crs = \"none\" says that coordinates are a plane, and to_crs needs to know where they are: leave one out"
+                "[input] crs = \"none\" makes the coordinates a plane, but to_crs needs their CRS: leave one out"
                     .into(),
             ));
         }
@@ -66,8 +66,8 @@ fn refuse_map_of_degrees(source: &Source, named: &Crs, options: &InputOptions) -
     }
     Err(Error::Config(format!(
         "{}: its columns are named as degrees (x from {} to {}, y from {} to {}), but {} is a map, whose coordinates are \
-         lengths: name what the degrees are in, such as missing_crs = \"EPSG:4326\" for longitude and latitude of WGS 84, together with to_crs; if they are no \
-         degrees, set [input] unit, for example to \"metre\"",
+         lengths: name the CRS of the degrees, such as missing_crs = \"EPSG:4326\" for longitude and latitude of WGS 84, together with \
+         to_crs; if they are not degrees, set [input] unit, for example to \"metre\"",
         source.path.display(),
         source.min[0],
         source.max[0],
@@ -94,7 +94,7 @@ pub(crate) fn no_way(source: &Source, why: &str) -> Error {
     let found = if is_said { String::new() } else { format!(". The file has no CRS{found}") };
     Error::Config(format!(
         "{}: {why}{found}. Other programs transform more: `pdal translate in.laz out.laz reprojection \
-         --filters.reprojection.out_srs=EPSG:...` does that first. If what the file says is wrong, [input] crs says what all files are in",
+         --filters.reprojection.out_srs=EPSG:...` does that first. If the CRS of the file is wrong, set [input] crs to that of all files",
         source.path.display()
     ))
 }

@@ -132,7 +132,7 @@ impl SurfaceShares {
             }
             MeshOf::Surface(Surface::First) => "the mesh of first returns includes roofs and tree tops",
             MeshOf::Surface(Surface::Last) => "the mesh of last returns includes buildings and dense vegetation",
-            MeshOf::Chosen => "the mesh is that of the classes and returns that [input] chooses",
+            MeshOf::Chosen => "the mesh has the classes and returns that [input] selects",
         };
         let remedy = match mesh {
             MeshOf::Chosen => "",
@@ -217,7 +217,7 @@ mod tests {
         );
         assert_eq!(say(&[(7, 5)], Surface::All), "");
         let chosen = shares(&[(2, 1), (40, 1)]).sentence(MeshOf::Chosen).unwrap();
-        assert_eq!(chosen, "50 % ground: the mesh is that of the classes and returns that [input] chooses");
+        assert_eq!(chosen, "50 % ground: the mesh has the classes and returns that [input] selects");
         assert!(shares(&[(2, 1)]).sentence(MeshOf::Chosen).unwrap().contains("bare earth"));
     }
 

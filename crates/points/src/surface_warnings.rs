@@ -38,9 +38,9 @@ pub fn unclear_returns(options: &InputOptions, counts: &PointCounts) -> Option<S
     }
     let rule = match options.kept_returns() {
         KeptReturns::All => return None,
-        KeptReturns::First => "they are taken as first returns",
-        KeptReturns::Last => "they are last returns if the number is not below the number of returns",
-        KeptReturns::Numbers(_) => "they are taken as number 1",
+        KeptReturns::First => "they are treated as first returns",
+        KeptReturns::Last => "they are treated as last returns if the number is not below the number of returns",
+        KeptReturns::Numbers(_) => "they are treated as number 1",
     };
     // Points of other classes are not looked at.
     let kept = options.kept_classes();

@@ -32,7 +32,8 @@ pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warning
     sources.iter_mut().for_each(Source::forget_transform);
     if options.missing_crs.is_some() && options.crs != CrsChoice::Auto {
         return Err(Error::Config(
-            "[input] missing_crs is for files that name no CRS, and crs says what all files are in: leave one of them out".into(),
+            "[input] missing_crs is for files that name no CRS, and crs sets that of all files: leave one of them out"
+                .into(),
         ));
     }
     let Some(target) = &options.to_crs else {
@@ -108,8 +109,8 @@ fn refuse_impossible_latitudes(sources: &[Source], said: &[Crs]) -> Result<()> {
     let mut all = sources.iter().zip(said);
     match all.find(|(source, crs)| is_impossible(source, crs)) {
         Some((source, crs)) => Err(Error::Config(format!(
-            "{}: y is from {} to {}, and no latitude of {} is beyond 90 degrees: if x and y are exchanged, name the columns `lat` and \
-             `lon`, or say with `columns` under [input.csv] which is which; if they are no degrees, name another CRS",
+            "{}: y is from {} to {}, but latitudes of {} end at 90 degrees: if x and y are exchanged, name the columns `lat` and \
+             `lon`, or set `columns` under [input.csv]; if they are not degrees, name another CRS",
             source.path.display(),
             source.min[1],
             source.max[1],
@@ -164,14 +165,15 @@ fn common_heights(
 fn refuse_other_heights(path: &str, own: &VerticalSystem, other: &str, known: &VerticalSystem) -> Result<()> {
     if let Some(difference) = own.difference_in_datum(known) {
         return Err(Error::Config(format!(
-            "{path} and {other} differ in {difference}: the way from one to the other needs the grid of a geoid. [input] to_crs transforms \
-             x and y and the unit of heights, not their datum, and does not leave that out: transform the heights with `pdal translate` \
+            "{path} and {other} differ in {difference}: converting between them needs a geoid grid. [input] to_crs transforms x, y and \
+             the unit of heights, but not their datum: transform the heights with `pdal translate` \
              first, or run two jobs"
         )));
     }
     match own.difference_in_direction(known) {
         Some(difference) => Err(Error::Config(format!(
-            "{path} and {other} differ in {difference}: z has the other sign. [input] to_crs does not turn it: do that first, for example \
+            "{path} and {other} differ in {difference}: z has the other sign. [input] to_crs does not invert it: do that first, for \
+             example \
              with `pdal translate in.laz out.laz assign --filters.assign.value=\"Z = -1 * Z\" --writers.las.forward=all`, and name the CRS \
              of heights, not of depths, with [input] crs"
         ))),
@@ -192,7 +194,7 @@ fn require_map(to: &Crs) -> Result<()> {
         return Ok(());
     }
     Err(Error::Config(format!(
-        "[input] to_crs ({}) is no map in a unit of length: name a projected CRS, such as \"EPSG:26915\", or \"utm\"",
+        "[input] to_crs ({}) is not a map in a unit of length: name a projected CRS, such as \"EPSG:26915\", or \"utm\"",
         to.label()
     )))
 }

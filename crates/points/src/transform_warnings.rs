@@ -49,7 +49,7 @@ pub(crate) fn warn_of_lengths(sources: &[Source], said: &[Crs], options: &InputO
     let others: Vec<_> = sources.iter().zip(said).filter(|(source, crs)| is_other(source, crs)).collect();
     if let Some((first, crs)) = others.first() {
         warnings.push(format!(
-            "{}x and y are taken as longitude and latitude ({}), though the columns of {} name the unit {}",
+            "{}x and y are treated as longitude and latitude ({}), though the columns of {} name the unit {}",
             of_all(others.len(), sources.len()),
             crs.label(),
             first.path.display(),
@@ -104,7 +104,8 @@ pub(crate) fn warn_of_datums(sources: &[Source], notes: &[DatumNote], warnings: 
     let assumed = all(&|note| if let DatumNote::Assumed(names) = note { Some(names.clone()) } else { None });
     if let Some((first, names)) = assumed.first() {
         warnings.push(format!(
-            "{}its datum is unknown, and {names} are assumed to be one; fix: [input] crs, because two datums may be hundreds of metres \
+            "{}its datum is unknown, and {names} are assumed to be the same; fix: [input] crs, because two datums may be hundreds of \
+             metres \
              apart",
             of_inputs(assumed.len(), sources.len(), &first.path)
         ));

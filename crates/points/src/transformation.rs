@@ -48,8 +48,8 @@ fn transformation(source: &Source) -> Option<Transformation> {
         return None;
     }
     let datums = match way.as_ref().map(CrsTransform::datums) {
-        Some(DatumNote::TakenAlike(names)) => format!("{names}, taken for one: up to a metre or two apart"),
-        Some(DatumNote::Assumed(names)) => format!("{names}, assumed to be one: they are not both named"),
+        Some(DatumNote::TakenAlike(names)) => format!("{names}, treated as one: up to a metre or two apart"),
+        Some(DatumNote::Assumed(names)) => format!("{names}, assumed to be the same: they are not both named"),
         Some(DatumNote::Same) | None => "the same".into(),
     };
     Some(Transformation {

@@ -64,7 +64,7 @@ fn mesh_of(parts: &[LineFeature], lattice: &CommonLattice) -> std::result::Resul
         triangles.extend(corners.into_iter().map(|corners| corners.map(|v| v.saturating_add(first))));
     }
     if overlap(&meshes) {
-        return Err("has parts that overlap, whose volume would count twice: merge them (in QGIS: \"Dissolve\")");
+        return Err("has parts that overlap, whose volume would be counted twice: merge them (in QGIS: \"Dissolve\")");
     }
     mesh_of_triangles(vertices, triangles)
 }
@@ -93,7 +93,7 @@ type Triangles = (Vec<Point>, Vec<[u32; 3]>);
 
 /// Cuts the area that closed rings enclose into triangles: what is inside an odd number of them.
 fn triangulated(mut rings: Vec<Vec<[i64; 2]>>) -> std::result::Result<Triangles, &'static str> {
-    const CROSSING: &str = "has outlines that cross, or touch along an edge: mend them (in QGIS: \"Fix geometries\")";
+    const CROSSING: &str = "has outlines that cross, or touch along an edge: repair them (in QGIS: \"Fix geometries\")";
     for ring in &mut rings {
         ring.dedup();
         while ring.len() > 1 && ring.first() == ring.last() {

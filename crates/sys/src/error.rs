@@ -62,9 +62,9 @@ pub enum Error {
 fn remedy(path: &Path, error: &std::io::Error) -> &'static str {
     match error.kind() {
         // What is printed has no directory to choose.
-        std::io::ErrorKind::StorageFull if path == Path::new(STANDARD_OUTPUT) => "; make room, and run again",
+        std::io::ErrorKind::StorageFull if path == Path::new(STANDARD_OUTPUT) => "; free some space, and run again",
         std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
-            "; make room or choose another [output] directory, and run again"
+            "; free some space or choose another [output] directory, and run again"
         }
         std::io::ErrorKind::FileTooLarge => "; raise the limit on the size of files (ulimit -f), and run again",
         std::io::ErrorKind::PermissionDenied => "; check the permissions",

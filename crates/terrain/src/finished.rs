@@ -81,7 +81,7 @@ impl FinishedTerrain {
         let mut tiles: Vec<(PathBuf, Checksum)> = with_paths.filter(|(path, _)| is_tile(path)).collect();
         tiles.sort_unstable_by(|a, b| a.0.cmp(&b.0));
         if let Some((gone, _)) = tiles.iter().find(|(path, _)| !path.exists()) {
-            return Err(sys::Error::input(gone, format!("the tile is gone: {RUN_AGAIN}")).into());
+            return Err(sys::Error::input(gone, format!("the tile is missing: {RUN_AGAIN}")).into());
         }
         let Some((first, _)) = tiles.first() else { return Err(no_output(directory, "has no tiles").into()) };
         let extras = read_extras(first)?;
@@ -89,7 +89,7 @@ impl FinishedTerrain {
         let grid = SourceGrid::new(&extras).map_err(|error| damaged(error.to_string()))?;
         let lattice = match facts.lattice {
             Some(lattice) if is_lattice_of(&lattice, &extras) => lattice,
-            _ => return Err(damaged("it lies on another lattice than report.json says".into()).into()),
+            _ => return Err(damaged("it lies on another lattice than that of report.json".into()).into()),
         };
         let georeference = listed_file(&output.georeference(), directory, &files)?;
         let system = TerrainSystem::new(&extras, georeference.as_deref());
@@ -135,7 +135,7 @@ impl FinishedTerrain {
         let path = self.directory.join(name);
         match self.files.get(name) {
             Some(wanted) => read_checked(&path, *wanted, GONE),
-            None => Err(sys::Error::input(&path, format!("it is none of the results: {RUN_AGAIN}"))),
+            None => Err(sys::Error::input(&path, format!("it is not one of the results: {RUN_AGAIN}"))),
         }
     }
 

@@ -79,7 +79,7 @@ pub fn same_system(
         let [own, other] = [first, second].map(label);
         Err(Error::Config(format!(
             "{first_name} is in {own}, but {second_name} is in {other}. They differ in {differences}. Two terrains are compared in one CRS: \
-             run one of the jobs again with [input] to_crs, or with [input] crs if what its files state is wrong"
+             run one of the jobs again with [input] to_crs, or with [input] crs if the CRS of its files is wrong"
         )))
     };
     let differences = first.crs.differences(&second.crs);
@@ -93,7 +93,7 @@ pub fn same_system(
         (Some(_), Some(_)) => match first.crs.sameness(&second.crs) {
             Sameness::Known => {}
             Sameness::Assumed => warnings.push(format!(
-                "a datum is unknown: {} are assumed to be one, though two datums may be hundreds of metres apart",
+                "a datum is unknown: {} are assumed to be the same, though two datums may be hundreds of metres apart",
                 first.crs.names_of_datums(&second.crs)
             )),
             Sameness::Refuted(why) => return refuse(&why),

@@ -225,7 +225,7 @@ impl TryFrom<Vec<String>> for ExportChoice {
                 let all = ExportFormat::ALL.map(|format| format!("\"{}\"", format.name()));
                 let near = if name.eq_ignore_ascii_case("dwg") { ": programs that know DWG open \"dxf\"" } else { "" };
                 let [first, ..] = &all;
-                format!("export is a list of {}, such as [{first}], and {name:?} is none of them{near}", all.join(", "))
+                format!("export is a list of {}, such as [{first}], not {name:?}{near}", all.join(", "))
             })
         };
         names.into_iter().map(format).collect::<std::result::Result<_, _>>().map(ExportChoice)
@@ -293,8 +293,7 @@ impl TryFrom<String> for ColorChoice {
             name if is_name_of_tiff(name) => ColorChoice::Photo(PathBuf::from(text)),
             _ => {
                 return Err(format!(
-                    "color is \"auto\", \"rgb\", \"elevation\", \"class\", \"none\" or an orthophoto such as \"ortho.tif\", and {text:?} is \
-                     none of them"
+                    "color is \"auto\", \"rgb\", \"elevation\", \"class\", \"none\" or an orthophoto such as \"ortho.tif\", not {text:?}"
                 ));
             }
         })

@@ -166,7 +166,7 @@ impl BreaklineEdges {
         let mut missing = self.edges.iter().zip(&self.is_found).filter(|(_, found)| !found.load(Ordering::Relaxed));
         let ([a, b], _) = missing.next()?;
         Some(format!(
-            "{} edges of breaklines.csv are no edges of the mesh, the first {}",
+            "{} edges of breaklines.csv are not edges of the mesh, the first {}",
             missing.count() + 1,
             grid.edge_text(*a, *b)
         ))
@@ -236,7 +236,7 @@ mod tests {
     fn every_edge_is_looked_for_at_its_heights() {
         assert_eq!(check("0,0,5,10,0,5,line\n10,0,5,5,9,7,river\n", &POINTS), [""; 0]);
         for (list, word) in [
-            ("0,0,5,16,9,5,line\n", "1 edges of breaklines.csv are no edges of the mesh"),
+            ("0,0,5,16,9,5,line\n", "1 edges of breaklines.csv are not edges of the mesh"),
             ("0,0,6,10,0,5,line\n", "1 vertices at another height than their breakline"),
             ("0,0,5,10,0.5,5,line\n", "line 2 is no edge"),
             ("rubbish", "line 2 is no edge"),

@@ -341,7 +341,7 @@ impl<'a> Inputs<'a> {
             && self.facts.input.is_some()
         {
             failures.push(format!(
-                "{} points of the inputs are no vertices, where report.json says that {dropped} were dropped at breaklines",
+                "{} points of the inputs are not vertices, but by report.json {dropped} were dropped at breaklines",
                 differences.dropped
             ));
         }
@@ -357,7 +357,7 @@ impl<'a> Inputs<'a> {
             }
         }
         let unproved = self.facts.input.is_none().then(|| {
-            "points may be missing: there is no report.json that says which points of the inputs the job wanted"
+            "points may be missing: there is no report.json to show which points of the inputs the job selected"
                 .to_owned()
         });
         let no_bound = || "the max_error in report.json is no bound on this lattice".to_owned();
@@ -482,9 +482,9 @@ impl Differences<'_> {
         let sentence = |(kind, difference): (usize, &Difference)| {
             let (count, [a, b]) = (difference.count, difference.first?);
             Some(match kind {
-                NO_POINT => format!("{count} vertices are no points of the inputs, the first at {}", self.text(a)),
+                NO_POINT => format!("{count} vertices are not points of the inputs, the first at {}", self.text(a)),
                 NO_VERTEX => {
-                    format!("{count} points of the inputs are no vertices, the first is {}", self.record_text(b))
+                    format!("{count} points of the inputs are not vertices, the first is {}", self.record_text(b))
                 }
                 _ => format!(
                     "{count} vertices have another height than the points of the inputs, the first at {}: it should be that of {}{}",
@@ -516,7 +516,7 @@ impl Differences<'_> {
             )
         });
         let too_many = (excused > dropped).then(|| {
-            format!("{excused} points beyond max_error lie at breaklines, where report.json says that {dropped} were dropped there")
+            format!("{excused} points beyond max_error lie at breaklines, where {dropped} points were dropped by report.json")
         });
         let sentences: Vec<String> = too_far.into_iter().chain(outside()).chain(too_many).collect();
         (!sentences.is_empty()).then(|| sentences.join("; "))

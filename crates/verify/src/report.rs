@@ -102,7 +102,7 @@ impl ReadReport {
     pub(super) fn read(directory: &Path) -> ReadReport {
         let text = match read_file(&OutputFiles::new(directory).report()) {
             Err(error) if error.kind() == ErrorKind::NotFound => {
-                let unproved = "sites may be missing: there is no report.json that says how many there are";
+                let unproved = "sites may be missing: there is no report.json with their number";
                 return ReadReport { unproved: Some(unproved.into()), ..ReadReport::default() };
             }
             Err(error) => return ReadReport::failed(format!("it cannot be read: {error}")),
@@ -115,7 +115,7 @@ impl ReadReport {
                 ReadReport { facts, failure: None, unproved: Some(unproved.into()) }
             }
             (Ok(facts), Some((own, found))) if own == found => ReadReport { facts, failure: None, unproved: None },
-            (Err(error), _) => ReadReport::failed(format!("it is no report of this program: {error}")),
+            (Err(error), _) => ReadReport::failed(format!("it is not a report of gdt-batch: {error}")),
             (Ok(_), _) => ReadReport::failed("it is not as the job wrote it: its own checksum does not fit".into()),
         }
     }

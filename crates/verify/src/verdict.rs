@@ -196,7 +196,7 @@ impl Verdict {
             }
             (Conclusion::Proved, _, true) => "proved: the exact Delaunay triangulation of the inputs' points",
             (Conclusion::Proved, _, false) => "proved: the exact Delaunay triangulation",
-            (Conclusion::AsFarAsCanBeTold, ..) => "Delaunay as far as can be told, but not proved",
+            (Conclusion::AsFarAsCanBeTold, ..) => "no error found, but not proved",
             (Conclusion::Failed, true, _) => "failed: files are not as the job wrote them",
             (Conclusion::Failed, false, true) => "failed: not the Delaunay triangulation of the inputs' points",
             (Conclusion::Failed, false, false) => "failed: not the Delaunay triangulation that the job wrote",

@@ -7,9 +7,9 @@ use super::{Case, Read, Refused, case};
 pub(super) fn cases(folder: &Path) -> Vec<Case> {
     let all = "max_malformed_fraction = 1.0";
     [
-        ("1.2-no-points.las", "", Refused(3, "holds 1065 records, but all are missing")),
+        ("1.2-no-points.las", "", Refused(3, "claims 1065 records, but all are missing")),
         ("1.2-no-points.las", all, Refused(3, "of 1065 read, 1065 are malformed")),
-        ("1.2-with-color-clipped.las", "", Refused(3, "holds 1065 records, but 1 is missing")),
+        ("1.2-with-color-clipped.las", "", Refused(3, "claims 1065 records, but 1 is missing")),
         ("1.2-with-color-clipped.las", all, Read(1065, 1, "1 are missing")),
         ("badheader.txt", "", Refused(3, "names 2 columns x")),
         ("badheader.txt", all, Refused(3, "name the columns with `columns`")),

@@ -33,7 +33,7 @@ fn common_fields() -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
         ("minor version", 25, vec![9], Refused(3, "LAS version 1.9")),
         ("system and software", 26, vec![0xff; 64], nothing_wrong()),
         ("day and year", 90, vec![0xff; 4], nothing_wrong()),
-        ("header size 0", 94, vec![0; 2], Refused(3, "says its header has 0 bytes")),
+        ("header size 0", 94, vec![0; 2], Refused(3, "claims a header of 0 bytes")),
         ("header size beyond", 94, vec![0xff; 2], Refused(3, "the header ends at 65535")),
         ("points at 0", 96, vec![0; 4], Refused(3, "points begin at byte 0")),
         ("points beyond", 96, vec![0xff; 4], Refused(3, "points begin at byte 4294967295")),
@@ -42,7 +42,7 @@ fn common_fields() -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
         ("point format", 104, vec![11], Refused(3, "format 11")),
         ("point format 63", 104, vec![63], Refused(3, "format 63")),
         ("compression bit", 104, vec![], Refused(3, "no LASzip record")),
-        ("record length 0", 105, vec![0; 2], Refused(3, "says a point record has 0 bytes")),
+        ("record length 0", 105, vec![0; 2], Refused(3, "claims point records of 0 bytes")),
         ("record length", 105, vec![0xff; 2], Refused(3, "all are missing")),
         ("points by return", 111, vec![0xff; 20], nothing_wrong()),
         ("scale 0", 131, double(0.0), Refused(3, "scale of x")),
@@ -81,7 +81,7 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
                 "64-bit count too large",
                 247,
                 201u64.to_le_bytes().to_vec(),
-                Refused(3, "holds 201 records, but 1 is missing"),
+                Refused(3, "claims 201 records, but 1 is missing"),
             ),
             ("64-bit count too small", 247, 150u64.to_le_bytes().to_vec(), Read(150, 0, "")),
             ("two counts", 107, vec![0xff; 4], Read(COUNT, 0, "two point counts")),
@@ -90,8 +90,8 @@ fn later_fields(minor: u8) -> Vec<(&'static str, usize, Vec<u8>, Gives)> {
         ]);
     } else {
         fields.extend([
-            ("count", 107, vec![0xff; 4], Refused(3, "holds 4294967295 records")),
-            ("count too large", 107, 201u32.to_le_bytes().to_vec(), Refused(3, "holds 201 records, but 1 is missing")),
+            ("count", 107, vec![0xff; 4], Refused(3, "claims 4294967295 records")),
+            ("count too large", 107, 201u32.to_le_bytes().to_vec(), Refused(3, "claims 201 records, but 1 is missing")),
             ("count too small", 107, 150u32.to_le_bytes().to_vec(), Read(150, 0, "")),
             ("no count", 107, vec![0; 4], Refused(3, "no point is left")),
         ]);

@@ -72,7 +72,7 @@ fn of_kind(layered: bool, bytes: &[u8]) -> Vec<Case> {
     }
     if !layered {
         let value = [1, 0];
-        let gives = Refused(3, "no usual program");
+        let gives = Refused(3, "unusual LASzip record");
         add(
             &mut cases,
             "colours of another version than times",

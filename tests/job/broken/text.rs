@@ -60,7 +60,7 @@ pub(super) fn cases() -> Vec<Case> {
         (
             "a number of points with commas",
             b"1,500\n1 2 3\n4 5 6\n7 8 1\n".to_vec(),
-            Refused(3, "is no number of points"),
+            Refused(3, "is not a point count"),
         ),
         ("PTX after a blank line", b"\n10\n20\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n".to_vec(), Refused(3, "is PTX")),
         ("not a number", rows_and("nan,1,2\n"), Refused(3, "line 6: column 1 (x) is \"nan\"")),
@@ -85,7 +85,7 @@ pub(super) fn cases() -> Vec<Case> {
         (
             "a second header, in other units",
             [b"x[m],y[m],z[m]\n", ROWS.as_bytes(), b"# x[m] y[m] z[ft]\n", ROWS.as_bytes()].concat(),
-            Refused(3, "line 7: the comment \"# x[m] y[m] z[ft]\" gives the columns other units than line 1"),
+            Refused(3, "line 7: the comment \"# x[m] y[m] z[ft]\" gives the columns different units than line 1"),
         ),
         (
             "a second header that is no comment",

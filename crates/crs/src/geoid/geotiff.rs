@@ -55,7 +55,7 @@ impl GeoTiff {
     /// [`Error::Config`] if it is no grid that can be read.
     pub(super) fn open(path: &Path, file: File) -> Result<(NodeGrid, GeoTiff), Error> {
         let read = catch_panic(|| GeoTiff::read_tags(path, file));
-        let no_grid = |what: String| bad_file(path, format!("it is no geoid grid that can be read: {what}"));
+        let no_grid = |what: String| bad_file(path, format!("it is not a readable geoid grid: {what}"));
         read.map_err(|e| e.to_string()).and_then(|read| read).map_err(no_grid)
     }
 
@@ -72,7 +72,7 @@ impl GeoTiff {
         let format = image.get_tag_u16_vec(Tag::SampleFormat).unwrap_or_default();
         if color != ColorType::Gray(32) || format != [SampleFormat::IEEEFP.to_u16()] {
             return Err(format!(
-                "it has {color:?} of the sample formats {format:?}; one band of 32-bit floating point is read"
+                "it has {color:?} of the sample formats {format:?}; only one band of 32-bit floating point is supported"
             ));
         }
         let (columns, rows) = image.dimensions().map_err(|e| e.to_string())?;
@@ -96,7 +96,7 @@ impl GeoTiff {
         let damaged = |what: String| bad_file(&self.path, format!("part {number} of the grid cannot be read: {what}"));
         match read.map_err(|e| e.to_string()).and_then(|read| read).map_err(damaged)? {
             DecodingResult::F32(values) => Ok(values.into()),
-            _ => Err(damaged("it has other numbers than the tags say".into())),
+            _ => Err(damaged("its data type differs from its tags".into())),
         }
     }
 }

@@ -20,7 +20,9 @@ const KIND: &str = "VERTICAL_OFFSET_GEOGRAPHIC_TO_VERTICAL";
 /// Returns the grid of an image with these columns and rows, or a sentence that says why it is none.
 pub(super) fn grid_of<R: Read + Seek>(image: &mut Decoder<R>, size: [u64; 2]) -> Result<NodeGrid, String> {
     if image.find_tag(Tag::ModelTransformationTag).ok().flatten().is_some() {
-        return Err("it has a ModelTransformation, which is not read; ModelTiepoint and ModelPixelScale are".into());
+        return Err(
+            "it has a ModelTransformation, which is not supported; ModelTiepoint and ModelPixelScale are".into()
+        );
     }
     let keys = image.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap_or_default();
     if geo_key(&keys, MODEL_TYPE.0).is_some_and(|kind| kind != MODEL_TYPE.1) {
@@ -30,7 +32,7 @@ pub(super) fn grid_of<R: Read + Seek>(image: &mut Decoder<R>, size: [u64; 2]) ->
     let scale = numbers(image, Tag::ModelPixelScaleTag);
     let tie = numbers(image, Tag::ModelTiepointTag);
     let (&[east, north, ..], &[column, row, _, x, y, _]) = (scale.as_slice(), tie.as_slice()) else {
-        return Err("it does not say where it is: one ModelTiepoint and a ModelPixelScale are missing".into());
+        return Err("it is not georeferenced: one ModelTiepoint and a ModelPixelScale are missing".into());
     };
     let is_point = geo_key(&keys, RASTER_TYPE.0) == Some(RASTER_TYPE.1);
     // The middle of a pixel is half a pixel from its corner, to which the tie point belongs if pixels are areas.
@@ -57,7 +59,7 @@ pub(super) fn check_kind<R: Read + Seek>(image: &mut Decoder<R>) -> Result<(), S
         is_scale && value.parse() != Ok(plain)
     };
     match items().find(scaled) {
-        Some((_, value)) => Err(format!("its values are scaled or shifted ({value}), which is not read")),
+        Some((_, value)) => Err(format!("its values are scaled or shifted ({value}), which is not supported")),
         None => Ok(()),
     }
 }

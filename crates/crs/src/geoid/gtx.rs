@@ -44,14 +44,14 @@ impl Gtx {
         if length < HEADER {
             return Err(bad_file(
                 path,
-                format!("{length} bytes are no geoid grid: a GTX file has a header of {HEADER}"),
+                format!("{length} bytes are not a geoid grid: a GTX file has a header of {HEADER}"),
             ));
         }
         let mut header = [0; HEADER as usize];
         read_exact_at(&file, &mut header, 0).map_err(Error::io("read", path))?;
         let [south, west, step_north, step_east] = [0, 8, 16, 24].map(|at| f64::from_be_bytes(eight(&header, at)));
         let [rows, columns] = [32, 36].map(|at| u64::try_from(int32(&header, at)).unwrap_or(0));
-        let no_grid = |what: String| bad_file(path, format!("it is no geoid grid in the format GTX: {what}"));
+        let no_grid = |what: String| bad_file(path, format!("it is not a geoid grid in the format GTX: {what}"));
         let grid = NodeGrid::new([west, south], [step_east, step_north], [columns, rows]).map_err(no_grid)?;
         let needed = HEADER + 4 * columns * rows;
         if length < needed {

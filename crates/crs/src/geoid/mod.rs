@@ -56,7 +56,7 @@ impl Geoid {
         grid.interpolate(longitude, latitude, &**values)?.ok_or_else(|| {
             let (why, remedy) = match grid.covers(longitude, latitude) {
                 true => (
-                    ": it covers the place, but a node beside it has NaN, the value for no height, or more than a kilometre".into(),
+                    ": it covers the place, but a neighbouring node has NaN, the value for no height, or more than a kilometre".into(),
                     "repair the grid, or take another one",
                 ),
                 false => (grid.extent(), "take a grid that covers the terrain"),
@@ -88,7 +88,7 @@ impl Geoid {
 pub fn require_file(path: &Path) -> Result<(), Error> {
     match path.metadata().map_err(|e| not_opened(path, e))?.is_file() {
         true => Ok(()),
-        false => Err(bad_file(path, "it is no file; name a geoid grid (.gtx or .tif)")),
+        false => Err(bad_file(path, "it is not a file; name a geoid grid (.gtx or .tif)")),
     }
 }
 

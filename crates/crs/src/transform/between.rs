@@ -125,7 +125,7 @@ impl Coordinates {
             return Err(format!("{label} is {}, neither a map nor longitude and latitude", crs.kind.name()));
         }
         let form = crs.form().ok_or_else(|| crs.why_without_form())?;
-        let datum = form.datum().ok_or_else(|| format!("{label} does not say its datum"))?.clone();
+        let datum = form.datum().ok_or_else(|| format!("{label} does not state its datum"))?.clone();
         let Some(projection) = form.projection() else {
             let unit = crs.wkt.as_deref().and_then(|text| find(text, &GEOGRAPHIC));
             let unit = degrees(unit.as_ref().and_then(|system| system.unit())) * DEGREE;
@@ -133,9 +133,9 @@ impl Coordinates {
             return Ok((datum, Coordinates { projection: None, unit, meridian }));
         };
         let ellipsoid = datum.ellipsoid().and_then(Ellipsoid::of).ok_or_else(|| format!("{label} has no ellipsoid"))?;
-        let unit = crs.metres_per_unit().ok_or_else(|| format!("{label} does not say the unit of x and y"))?;
+        let unit = crs.metres_per_unit().ok_or_else(|| format!("{label} does not state the unit of x and y"))?;
         let projection = MapProjection::of(projection, ellipsoid);
-        let projection = projection.map_err(|why| format!("this program does not compute {label}: {why}"))?;
+        let projection = projection.map_err(|why| format!("gdt-batch does not support {label}: {why}"))?;
         let meridian = datum.meridian() * DEGREE;
         Ok((datum, Coordinates { projection: Some(projection), unit, meridian }))
     }

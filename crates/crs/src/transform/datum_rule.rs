@@ -72,12 +72,11 @@ pub(crate) fn datum_way(from: &Datum, to: &Datum, rule: DatumRule) -> DatumWay {
         None => "a shift".to_string(),
     };
     let remedy = if are_close {
-        ". As these two agree to a metre or two, [input] datums = \"close\" takes them for one"
+        ". As these two agree to a metre or two, [input] datums = \"close\" treats them as one"
     } else {
         ""
     };
     DatumWay::Shift(format!(
-        "they differ in {difference}: the way from one to the other is {what}, which this program does not do and does not leave \
-         out{remedy}"
+        "they differ in {difference}: the transformation between them needs {what}, which gdt-batch does not do{remedy}"
     ))
 }

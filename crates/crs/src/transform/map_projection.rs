@@ -64,12 +64,12 @@ impl MapProjection {
         let label = projection.label();
         let is_odd = |name: &&String| !is_known(projection.method(), name) && !is_idle(name, projection.value(name));
         if let Some(odd) = projection.names().find(is_odd) {
-            return Err(format!("the parameter {odd} of its projection ({label}) is not known here"));
+            return Err(format!("the parameter {odd} of its projection ({label}) is unknown"));
         }
         let direction = direction(projection)?;
         if has_two_scales(projection) {
             return Err(format!(
-                "it gives two standard parallels and the scale factor {} beside them, and programs do not agree what that means",
+                "it gives two standard parallels and also the scale factor {}, which programs interpret differently",
                 projection.value("k_0")
             ));
         }
@@ -183,7 +183,7 @@ fn polar(projection: &Projection, ellipsoid: Ellipsoid, latitude: f64, scale: f6
 fn direction(projection: &Projection) -> Result<f64, String> {
     match projection.method() {
         SOUTH if projection.may_go_south_west() => Ok(-1.0),
-        SOUTH => Err("its axes are not those to the west and south of its projection".into()),
+        SOUTH => Err("its axes do not point west and south, as those of its projection do".into()),
         _ if projection.has_other_axes() => Err("its x grows to the west, or its y to the south".into()),
         _ => Ok(1.0),
     }

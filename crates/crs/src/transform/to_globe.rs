@@ -74,12 +74,12 @@ impl GlobeWay {
     /// `metres`.
     ///
     /// # Errors
-    /// A sentence if this program does not compute it.
+    /// A sentence if gdt-batch does not support it.
     pub fn of(crs: &Crs, definition: &str, metres: f64) -> Result<GlobeWay, String> {
         let to_degrees = CrsTransform::to_degrees(crs).map_err(|why| format!("{why} ({ELSEWHERE})"))?;
         let form = crs.form().filter(|form| form.projection().is_some());
         let (form, own) = form.zip(crs.metres_per_unit()).ok_or("it is not a projected system")?;
-        let datum = form.datum().ok_or_else(|| format!("{} does not say its datum", crs.label()))?;
+        let datum = form.datum().ok_or_else(|| format!("{} does not state its datum", crs.label()))?;
         if meridian(definition).is_none_or(|east| (east - datum.meridian()).abs() > SAME_MERIDIAN) {
             return Err(format!("{} and {definition} differ in the prime meridian ({ELSEWHERE})", crs.label()));
         }
@@ -193,7 +193,7 @@ fn meridian(definition: &str) -> Option<f64> {
 
 fn needs_grid(definition: &str) -> String {
     format!(
-        "the way from the datum of {definition} to WGS 84 needs a grid, which this program does not have (transform the points to a datum \
+        "the datum shift from {definition} to WGS 84 needs a grid, which gdt-batch does not have (transform the points to a datum \
          such as NAD83 first)"
     )
 }
@@ -353,7 +353,7 @@ mod tests {
         assert!(southings.contains("S-JTSK / Krovak") && southings.contains("pdal translate"), "{southings}");
         assert!(refused(27200, "+proj=nzmg").contains("New_Zealand_Map_Grid"));
         let british = "+proj=tmerc +nadgrids=OSTN15.gsb";
-        assert!(refused(27700, british).contains(&format!("the datum of {british} to WGS 84 needs a grid")));
+        assert!(refused(27700, british).contains(&format!("the datum shift from {british} to WGS 84 needs a grid")));
         let old = refused(26715, "+proj=utm +zone=15 +datum=NAD27 +units=m +no_defs");
         assert!(old.contains("needs a grid") && old.contains("NAD27") && old.contains("NAD83"), "{old}");
         assert!(refused(27700, "+proj=tmerc +towgs84=1,2").contains("cannot be read"));

@@ -16,7 +16,7 @@ pub fn utm_zone(crs: &Crs, place: [f64; 2], rule: DatumRule) -> Result<Crs, Stri
     let names = [format!("UTM zone {zone}{side}\""), format!("MGA zone {zone}\"")];
     let names = if place[1] < 0.0 { &names[..] } else { &names[..1] };
     let datum = crs.form().and_then(|form| form.datum().cloned());
-    let datum = datum.ok_or_else(|| format!("{} does not say its datum", crs.label()))?;
+    let datum = datum.ok_or_else(|| format!("{} does not state its datum", crs.label()))?;
     let is_named = |code: &u32| text_of_code(*code).is_some_and(|text| names.iter().any(|n| title(text).ends_with(n)));
     let zones = (1..=u32::from(u16::MAX)).filter(is_named).filter_map(from_epsg);
     let mut zones = zones.filter(|zone| zone.metres_per_unit() == Some(1.0));

@@ -453,7 +453,10 @@ mod tests {
         let names = names(&["tiles/000000.glb", "tiles/000001.glb", "XXH128SUMS", "report.json"]);
         let error = directory.replace_results(&names, false).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Usage);
-        assert!(error.to_string().contains("000000.glb came during the job, and no job wrote it"), "{error}");
+        assert!(
+            error.to_string().contains("000000.glb appeared during the job, and is not one of its results"),
+            "{error}"
+        );
         assert_eq!(fs::read(directory.results().tile(0)).unwrap(), b"theirs");
         fs::remove_file(directory.results().tile(0)).unwrap();
         directory.replace_results(&names, false).unwrap();

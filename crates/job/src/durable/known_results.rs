@@ -72,7 +72,8 @@ impl KnownResults {
         if content(waits)? == content(place)? {
             return Ok(());
         }
-        let what = "came during the job, and no job wrote it: move it away, and run the same command again";
+        let what =
+            "appeared during the job, and is not one of its results: move it away, and run the same command again";
         Err(Error::Config(format!("{} {what}", place.display())))
     }
 }

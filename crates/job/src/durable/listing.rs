@@ -147,7 +147,7 @@ pub(crate) fn check_page_is_ours(results: &OutputFiles) -> Result<()> {
         return Ok(());
     }
     Err(Error::Config(format!(
-        "{} exists, and no job wrote it: move it away, or set [output] page = false",
+        "{} exists, and is not a result of a job: move it away, or set [output] page = false",
         results.page().display()
     )))
 }

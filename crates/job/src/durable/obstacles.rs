@@ -31,7 +31,7 @@ pub fn check_nothing_in_the_way(directory: &JobDirectory) -> Result<()> {
     let mut folders = output.ancestors().chain(own.iter().map(PathBuf::as_path));
     let is_in_the_way = |path: &Path| Ok(is_there(path)? && !is_folder(path)?);
     let (found, what, wanted) = if let Some(found) = find(&mut folders, is_in_the_way)? {
-        let what = if exists(found)? { "is not a directory" } else { "is a link that leads nowhere" };
+        let what = if exists(found)? { "is not a directory" } else { "is a broken link" };
         (found.to_path_buf(), what, "a directory")
     } else if let Some(found) = find(&mut files, is_no_file)? {
         let what = if is_folder(&found)? { "is a directory" } else { "is a pipe or a device" };
@@ -65,11 +65,11 @@ pub fn check_results_are_ours(directory: &JobDirectory, page: bool) -> Result<()
     };
     let Some(found) = first_unknown(directory, &known)? else { return Ok(()) };
     let why = match is_finished && !known.has_list {
-        true => format!(" ({} is gone or damaged, which would name it)", results.checksums().display()),
+        true => format!(" ({} is missing or damaged, which would list it)", results.checksums().display()),
         false => String::new(),
     };
     Err(Error::Config(format!(
-        "{} exists, a job would overwrite or remove it, and nothing says that an earlier job wrote it{why}: choose another [output] \
+        "{} would be overwritten or removed, but is not known to be a result of an earlier job{why}: choose another [output] \
          directory, or move it away",
         found.display()
     )))

@@ -366,7 +366,7 @@ impl Outside {
                 arc(self.beyond) * DEGREE,
                 self.area
             ),
-            None => format!("are no place on earth; its area of use is {}", self.area),
+            None => format!("are not on earth; its area of use is {}", self.area),
         };
         let contradiction = self.crs.difference_to_code();
         let contradiction =

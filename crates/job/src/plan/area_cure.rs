@@ -134,10 +134,7 @@ impl Change {
             Change::Degrees { exchanged: false } => "as longitude and latitude, they lie within it".into(),
             Change::Unit(unit) => format!("in the unit {}, they lie within it", unit.name()),
             Change::Moved(by) => {
-                format!(
-                    "with {}, they lie within it: the number of a zone or a false origin is too much or missing",
-                    moved(*by)
-                )
+                format!("with {}, they lie within it: a zone number or a false origin is extra or missing", moved(*by))
             }
             Change::Southern(_, name) => {
                 format!("in the southern zone of the same number ({name}), they lie within its area")

@@ -122,8 +122,8 @@ fn one_of<'a>(
     match lengths.find(|(_, other)| !is_first && differs(*other)) {
         None => Ok(Some((first, metres))),
         Some((other, others)) => Err(Error::Config(format!(
-            "{} has {what} in {}, but {} has them in {}, and [input] crs says no unit for them: convert one of them, run two jobs, or say \
-             [input] crs = \"first\" if the first is right",
+            "{} has {what} in {}, but {} has them in {}, and [input] crs has no unit for them: convert one of them, run two jobs, or \
+             set [input] crs = \"first\" if the first is right",
             first.source.path.display(),
             Unit::from_metres(Some(metres)).name(),
             other.source.path.display(),
@@ -191,16 +191,16 @@ fn two_systems(own: &StatedCrs, other: &StatedCrs, differences: &[String]) -> Er
     let are_units = !own.crs.is_named() || !other.crs.is_named();
     let what_to_do = match are_units {
         true if own.crs.metres_per_unit() != other.crs.metres_per_unit() => {
-            "One job takes one unit: convert one of them first, or run two jobs. If the names of columns are wrong, say with [input] unit \
-             what x, y and z of all texts are in"
+            "One job takes one unit: convert one of them first, or run two jobs. If the names of columns are wrong, set [input] unit to \
+             the unit of x, y and z in all text files"
         }
         true => {
             "One job takes one unit of heights: convert one of them first, or run two jobs. If one is wrong, [input] crs = \"first\" takes \
              that of the first file with a CRS, or of the first file if none has one"
         }
         false => {
-            "One job takes one CRS: [input] to_crs = \"utm\" or \"EPSG:...\" transforms all points into one, or run two jobs. If a record is \
-             wrong, say with [input] crs what all files are in, such as \"EPSG:26915\", or \"first\" for what the first file says"
+            "One job takes one CRS: [input] to_crs = \"utm\" or \"EPSG:...\" transforms all points into one, or run two jobs. If a \
+             record is wrong, set [input] crs to the CRS of all files, such as \"EPSG:26915\", or to \"first\" for that of the first file"
         }
     };
     let (own, other, differences) = (is_in(own), is_in(other), differences.join(" and "));
@@ -316,8 +316,8 @@ pub fn horizontal_unit(
     };
     // What the user says is no record of a file.
     let what_to_do = match chosen {
-        CrsChoice::Given { .. } => "if the files are in another CRS than [input] crs says, name that one",
-        _ => "if the CRS record is wrong, say with [input] crs what the files are in",
+        CrsChoice::Given { .. } => "if the files are in another CRS than [input] crs, name that one",
+        _ => "if the CRS record is wrong, set [input] crs to the right one",
     };
     let unit = if choice == UnitChoice::Auto { crs.horizontal } else { choice.unit() };
     if let Some(metres) = unit.metres_per_unit() {

@@ -122,7 +122,7 @@ impl FolderFiles {
 
 /// Says what is wrong with a link whose target is missing.
 pub fn leads_nowhere(link: &Path) -> String {
-    format!("{} is a link to a file that is not there: mend or remove it", link.display())
+    format!("{} is a link to a missing file: repair or remove it", link.display())
 }
 
 /// Returns the folder and the ending of a file.

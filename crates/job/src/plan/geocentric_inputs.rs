@@ -24,8 +24,8 @@ pub(crate) fn refuse_geocentric(sources: &[Source], options: &InputOptions) -> R
     };
     if let Some(source) = of_record {
         return Err(Error::Config(format!(
-            "{}: the coordinates are geocentric ({}): they count from the middle of the earth, and z is no height. {TRANSFORM}; if the CRS \
-             record is wrong, say with [input] crs what the files are in, or \"none\" for a plane",
+            "{}: the coordinates are geocentric ({}): their origin is the centre of the earth, and z is not a height. {TRANSFORM}; if \
+             the CRS record is wrong, set [input] crs to the right one, or \"none\" for a plane",
             source.path.display(),
             source.own_crs().label()
         )));
@@ -47,7 +47,7 @@ fn said_by_user<'a>(key: &str, crs: &Crs, sources: impl Iterator<Item = &'a Sour
     Error::Config(match elsewhere.next() {
         Some(source) => format!(
             "[input] {key} is {label}, which is geocentric, but the points of {} do not lie on the surface of the earth (x from {} to {}, y \
-             from {} to {}, z from {} to {}). If they are in another CRS than [input] {key} says, {other}",
+             from {} to {}, z from {} to {}). If they are in another CRS than [input] {key}, {other}",
             source.path.display(),
             source.min[0],
             source.max[0],
@@ -57,8 +57,8 @@ fn said_by_user<'a>(key: &str, crs: &Crs, sources: impl Iterator<Item = &'a Sour
             source.max[2],
         ),
         None => format!(
-            "the coordinates are geocentric ([input] {key} is {label}): they count from the middle of the earth, and z is no height. \
-             {TRANSFORM}; if the files are in another CRS than [input] {key} says, {other}"
+            "the coordinates are geocentric ([input] {key} is {label}): their origin is the centre of the earth, and z is not a height. \
+             {TRANSFORM}; if the files are in another CRS than [input] {key}, {other}"
         ),
     })
 }
@@ -92,7 +92,7 @@ pub(crate) fn warn_of_degrees(sources: &[Source], options: &InputOptions, warnin
     let found: Vec<&Source> = sources.iter().filter(is_meant).collect();
     if let Some(first) = found.first() {
         warnings.push(format!(
-            "{}its x ({} to {}) and y ({} to {}) look like longitude and latitude, but are taken as lengths; fix: [input] crs = \
+            "{}its x ({} to {}) and y ({} to {}) look like longitude and latitude, but are treated as lengths; fix: [input] crs = \
              \"EPSG:4326\" and [input] to_crs = \"utm\" for degrees, [input] crs = \"none\" for a plane",
             of_inputs(found.len(), sources.len(), &first.path),
             first.min[0],

@@ -24,7 +24,7 @@ pub(crate) fn globe_way(crs: &Crs, metres: f64) -> Result<GlobeWay, String> {
 /// Returns the definition of `crs` in the form of PROJ.4.
 fn definition(crs: &Crs) -> Result<String, String> {
     crs.proj4_definition().ok_or_else(|| match &crs.name {
-        Some(name) => format!("{name} has no definition that leads to longitude and latitude"),
+        Some(name) => format!("{name} has no definition that gdt-batch can transform to longitude and latitude"),
         None => "no input names its coordinate system".to_string(),
     })
 }

@@ -200,7 +200,7 @@ pub fn check_missing_records(sources: &[Source], options: &InputOptions) -> Resu
 }
 
 fn missing_records(Source { records, missing, format, .. }: &Source) -> String {
-    let start = format!("says that it holds {records} records, but");
+    let start = format!("claims {records} records, but");
     if missing < records {
         let are = if *missing == 1 { "is" } else { "are" };
         return format!(

@@ -299,7 +299,8 @@ fn refuse_contradicting_options(options: &JobOptions) -> Result<()> {
     }
     if options.output.selects() && options.output.max_edge == MaxEdge::Auto {
         return Err(Error::Config(
-            "[output] max_edge = \"auto\" goes by the spacing of points, and with max_error flat ground has few vertices: give max_edge a \
+            "[output] max_edge = \"auto\" depends on the spacing of points, and with max_error flat ground has few vertices: give \
+             max_edge a \
              length such as 30.0, or leave it out"
                 .into(),
         ));

@@ -48,7 +48,8 @@ fn refuse_degrees_as_lengths(
         return Ok(());
     }
     Err(Error::Config(format!(
-        "{} {}, whose unit is the degree, but [input] unit says {}: leave unit out, and set to_crs = \"utm\" to transform the degrees. If the \
+        "{} {}, whose unit is the degree, but [input] unit is {}: leave unit out, and set to_crs = \"utm\" to transform the degrees. If \
+         the \
          coordinates are lengths, set crs = \"none\" as well",
         subject(),
         crs.label(),
@@ -71,7 +72,7 @@ fn refuse(crs: &Crs, subject: impl Fn() -> String, options: &InputOptions) -> Re
     }
     let metres = unit.metres_per_unit().unwrap_or(1.0);
     Err(Error::Config(format!(
-        "{} {}, whose unit is the {}, but [input] unit says {}: leave unit out if the CRS is right. If the unit of the \
+        "{} {}, whose unit is the {}, but [input] unit is {}: leave unit out if the CRS is right. If the unit of the \
          coordinates is the {}, name a CRS in that unit with [input] crs: an EPSG code, or the well-known text of this one with UNIT[\"{}\",{metres}] as its last unit",
         subject(),
         crs.label(),

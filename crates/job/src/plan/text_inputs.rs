@@ -70,7 +70,7 @@ pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Resu
 fn why_no_degrees(options: &InputOptions) -> String {
     match options.unit {
         UnitChoice::Auto => "and a Delaunay triangulation in degrees is distorted".into(),
-        unit => format!("but [input] unit says {}, which is no unit of degrees", unit.unit().name()),
+        unit => format!("but [input] unit is {}, which is not a unit of degrees", unit.unit().name()),
     }
 }
 
@@ -120,7 +120,7 @@ pub(crate) fn refuse_missing_returns(sources: &[Source], options: &InputOptions)
     };
     match sources.iter().find(|source| source.format == FileFormat::Text && !source.has_returns) {
         Some(source) => Err(Error::Config(format!(
-            "[input] surface or returns choose some returns, but {} does not say which return its points are: that takes {columns}; \
+            "[input] surface or returns choose some returns, but {} has no returns: it needs {columns}; \
              name the columns with `columns` under [input.csv], leave the file out, or keep all returns",
             source.path.display()
         ))),

@@ -307,7 +307,7 @@ impl Preflight {
         match self.disk_earlier {
             0 => String::new(),
             bytes => format!(
-                "; the results of an earlier job, {}, stay until the new ones are whole: without them there is more room",
+                "; the results of an earlier job, {}, are kept until the new ones are complete: without them there is more space",
                 mebibytes(bytes)
             ),
         }

@@ -23,7 +23,7 @@ pub(crate) fn check_inputs_are_no_results(plan: &Plan) -> Result<()> {
     match inputs(plan).find(|(_, path)| is_result(path)) {
         None => Ok(()),
         Some((option, path)) => Err(Error::Config(format!(
-            "{option}: {} is where a job writes a result, which would replace it: name other files, or choose another [output] directory",
+            "{option}: {} has the name of a result, which would overwrite it: rename it, or choose another [output] directory",
             path.display()
         ))),
     }

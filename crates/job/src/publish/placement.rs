@@ -36,7 +36,7 @@ pub(crate) struct Placement {
 }
 
 /// The warning about a geoid that is added to heights which need none.
-const ADDED_TWICE: &str = "heights are above the ellipsoid by the inputs, and [output] height_offset adds a geoid to them; fix: leave \
+const ADDED_TWICE: &str = "the inputs state ellipsoidal heights, and [output] height_offset adds a geoid to them; fix: leave \
      [output] height_offset out, unless the inputs are wrong";
 
 /// Places `root`, and each tile below if need be. Tiles have positions by `frame`, and heights count from `geoid`.
@@ -124,7 +124,7 @@ pub(crate) fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Opt
         ),
         _ if off <= ONE_TRANSFORM => None,
         (false, true) => Some(format!(
-            "places are up to {off:.1} m off on the globe; fix: [output] compression = \"meshopt\", or [input] bounds for a smaller \
+            "positions on the globe are up to {off:.1} m off; fix: [output] compression = \"meshopt\", or [input] bounds for a smaller \
              terrain"
         )),
         (per_tile, false) => Some(format!(

@@ -60,7 +60,7 @@ impl fmt::Display for JobStatus {
             JobState::OtherResults => {
                 "there is no plan of this job yet; the results in place are of other options, inputs, or program"
             }
-            JobState::UnderWay => "under way, or waiting to go on",
+            JobState::UnderWay => "in progress, or waiting to continue",
             JobState::LeftToPublish => "not done part by part: the phase publish does all of it",
             JobState::Done => "done: all results are in place",
         };

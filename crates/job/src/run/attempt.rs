@@ -43,7 +43,7 @@ use sys::{ErrorKind, disk};
 
 /// What the user must know where a lock keeps nobody out.
 pub(crate) const NO_LOCKS: &str =
-    "the file system of the output directory has no locks: see to it that no other process works there";
+    "the file system of the output directory has no locks: make sure that no other process works there";
 
 /// Give up after this many tenfold coarsenings: what is left is no terrain.
 const MAX_COARSENINGS: u32 = 6;

@@ -242,7 +242,7 @@ impl EarlierRun {
                 let meshed = kept.parts.meshed();
                 if !meshed.iter().all(|part| part.is_kept) {
                     progress.note(&format!(
-                        "changed since the interrupted run: {what}; it has freed what that takes ([limits] keep_steps); starting over"
+                        "changed since the interrupted run: {what}; the mesh is already deleted ([limits] keep_steps); starting over"
                     ));
                     return None;
                 }
@@ -414,7 +414,7 @@ pub(crate) fn start<'a>(
     if is_update {
         directory.keep_results(&parts.files().map(|file| file.name.clone()).collect())?;
     } else if resumed > 0 {
-        progress_of_tasks.note(&format!("going on with an interrupted run; phases complete: {resumed}"));
+        progress_of_tasks.note(&format!("continuing an interrupted run; phases complete: {resumed}"));
     }
     // Only a plan that stays calls the inputs what they were called.
     let fingerprint = match has_plan {

@@ -119,6 +119,6 @@ pub(crate) fn without_pixel_warning(plan: &Plan, vertices: u64) -> Option<String
     let path = plan.options.output.color.photo().filter(|_| vertices > 0)?.display();
     let are = if vertices == 1 { "vertex is" } else { "vertices are" };
     Some(format!(
-        "{vertices} {are} grey, outside {path} or where it has no picture; fix: name a picture of the whole area in [output] color"
+        "{vertices} {are} grey, outside {path} or where it is empty; fix: [output] color with an orthophoto of the whole area"
     ))
 }

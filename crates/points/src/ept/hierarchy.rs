@@ -82,7 +82,7 @@ fn entries(index: &Path, root: NodeKey) -> Result<Vec<(NodeKey, i64)>> {
     let refused = |what: String| Error::input(name_beside(index, &page_name(root)), what);
     let bytes = page(index, root)?;
     let entries: BTreeMap<String, i64> = serde_json::from_slice(bytes.as_ref())
-        .map_err(|error| refused(format!("is no page of a hierarchy that can be read: {error}")))?;
+        .map_err(|error| refused(format!("is not a readable page of the hierarchy: {error}")))?;
     let entry = |(text, points): (String, i64)| {
         let key = NodeKey::parse(&text).filter(|key| key.is_within(root));
         let key = key.ok_or_else(|| refused(format!("has the node {text:?}, which does not belong to it")))?;
@@ -128,7 +128,7 @@ mod tests {
     fn what_is_wrong_is_named_with_its_page() {
         for (pages, words) in [
             (&PAGES[..1], "ept-hierarchy/1-1-0-0.json of its hierarchy is not there"),
-            (&[("0-0-0-0", "{\"0-0-0-0\": 5")], "0-0-0-0.json: is no page of a hierarchy"),
+            (&[("0-0-0-0", "{\"0-0-0-0\": 5")], "0-0-0-0.json: is not a readable page of the hierarchy"),
             (&[("0-0-0-0", r#"{"0-0-0-0": -1}"#)], "has -1 as the points of node 0-0-0-0"),
             (&[("0-0-0-0", r#"{"0-0-0-0": -2}"#)], "has -2 as the points"),
             (&[("0-0-0-0", r#"{"1-2-0-0": 2}"#)], "has the node \"1-2-0-0\", which does not belong"),

@@ -77,30 +77,31 @@ impl EptIndex {
     /// [`Error::Input`] if it is none, or points are held in a way that is not read.
     pub(crate) fn parse(path: &Path, text: &[u8], warnings: &mut Warnings) -> Result<EptIndex> {
         let refused = |what: String| Error::input(path, what);
-        let file: IndexFile = serde_json::from_slice(text)
-            .map_err(|error| refused(format!("is no index of an EPT that can be read: {error}")))?;
+        let file: IndexFile =
+            serde_json::from_slice(text).map_err(|error| refused(format!("is not a readable EPT index: {error}")))?;
         let data_type = match file.data_type.as_str() {
             "laszip" => DataType::Laszip,
             "binary" => DataType::Binary,
             "zstandard" => DataType::Zstandard,
             other => {
-                let what =
-                    format!("has nodes of the type {other:?}: read are \"laszip\", \"binary\" and \"zstandard\"");
+                let what = format!(
+                    "has nodes of the type {other:?}: only \"laszip\", \"binary\" and \"zstandard\" are supported"
+                );
                 return Err(refused(what));
             }
         };
         if let Some(other) = file.hierarchy_type.as_ref().filter(|kind| *kind != "json") {
-            return Err(refused(format!("has a hierarchy of the type {other:?}: only \"json\" is read")));
+            return Err(refused(format!("has a hierarchy of the type {other:?}: only \"json\" is supported")));
         }
         if file.points >= MOST_POINTS {
-            return Err(refused(format!("says it has {} points, more than one job can hold", file.points)));
+            return Err(refused(format!("claims {} points, more than one job can hold", file.points)));
         }
         let axes = [0, 1, 2].map(|axis| axis_in(&file.schema, axis).map_err(refused));
         let [x, y, z] = axes;
         let [xmin, ymin, _, xmax, ymax, _] = file.bounds;
         let side = [xmax - xmin, ymax - ymin];
         if side.iter().any(|side| !(side.is_finite() && *side > 0.0)) {
-            return Err(refused(format!("has bounds that are no cube: {:?}", file.bounds)));
+            return Err(refused(format!("has bounds that are not a cube: {:?}", file.bounds)));
         }
         let bounds = file.bounds_conforming.unwrap_or(file.bounds);
         let has = |name: &str| file.schema.iter().any(|dimension| dimension.name == name);
@@ -124,7 +125,8 @@ fn axis_in(schema: &[Dimension], axis: usize) -> std::result::Result<Axis, Strin
     let dimension = dimension.ok_or_else(|| format!("has no dimension {name} in its schema"))?;
     if !["signed", "unsigned"].contains(&dimension.kind.as_str()) {
         return Err(format!(
-            "has {name} as {} numbers without a scale, which have no lattice: build it again with a scale, for example with `entwine build \
+            "has {name} as {} numbers without a scale, so they are on no lattice: build it again with a scale, for example with \
+             `entwine build \
              --scale 0.01`",
             dimension.kind
         ));

@@ -26,7 +26,7 @@ impl<S: RecordSink> RecordSink for NodeSink<'_, S> {
         let file = self.file.display();
         if self.cell.is_some_and(|cell| !cell.hold(&record.raw)) {
             let what = format!(
-                "{} of {file} lies elsewhere than the octree says, so that points within bounds cannot be found by it: build the data set \
+                "{} of {file} lies outside its cell of the octree, so points within bounds cannot be found: build the data set \
                  again, or leave [input] bounds and clip out",
                 place()
             );

@@ -96,8 +96,7 @@ impl EptPoints {
         let hierarchy = Hierarchy::read(path, is_wanted)?;
         let promised = index.points;
         if hierarchy.points > promised {
-            let what =
-                format!("says it has {promised} points, but the nodes of its hierarchy have {}", hierarchy.points);
+            let what = format!("claims {promised} points, but the nodes of its hierarchy have {}", hierarchy.points);
             return Err(Error::input(path, format!("{what}: one of the two is damaged, so copy or build it again")));
         }
         let missing = if hierarchy.is_whole { promised - hierarchy.points } else { 0 };
@@ -274,7 +273,7 @@ impl NodeRequest<'_> {
             read => read?,
         };
         if header.axes != *axes {
-            return Err(self.refused("this node has another scale or offset than the index says"));
+            return Err(self.refused("this node has another scale or offset than the index"));
         }
         if header.records != self.node.points {
             let what = format!("this node has {} points, and its hierarchy says {}", header.records, self.node.points);

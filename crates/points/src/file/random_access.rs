@@ -132,7 +132,7 @@ impl RandomAccessFile {
     }
 
     /// As [`RandomAccessFile::range`], for a caller who knows what he skips: at most `read_ahead` bytes of that are read.
-    #[cfg_attr(not(feature = "remote"), allow(unreachable_code, reason = "then no file is of another machine"))]
+    #[cfg_attr(not(feature = "remote"), allow(unreachable_code, reason = "then no file is remote"))]
     pub(crate) fn range_with(&self, range: Range<u64>, read_ahead: usize) -> Result<FileRange> {
         let source = match &self.content {
             Content::Local(file) => RangeSource::Local(file.try_clone().map_err(Error::io("read", &self.path))?),
@@ -163,7 +163,7 @@ fn kind_text(path: &Path) -> &'static str {
     if path.is_dir() {
         "is a directory, not a regular file; name the point clouds in it"
     } else if is_pipe(path) {
-        "is a pipe, not a regular file, and cannot be read twice; save what comes out of it as a file, and name that"
+        "is a pipe, not a regular file, and cannot be read twice; save its output to a file, and name that"
     } else {
         "is a device, not a regular file; name a point cloud"
     }

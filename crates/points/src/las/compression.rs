@@ -22,8 +22,8 @@ pub(crate) enum LaszipError {
     #[error("has a LASzip record that {0}; the file is damaged or of a newer kind")]
     Broken(String),
     #[error(
-        "has a LASzip record that puts its points together as no usual program does ({0}), and such points with GPS times are not \
-         decoded; write the file again, for example with `pdal translate` or `las2las`"
+        "has an unusual LASzip record ({0}), which is not supported for points with GPS times; write the file again, for example with \
+         `pdal translate` or `las2las`"
     )]
     Unusual(String),
 }
@@ -54,7 +54,7 @@ impl LazCompression {
         let size: u64 = items.iter().map(|item| item.size() as u64).sum();
         if size != header.record_length as u64 {
             return Err(broken(format!(
-                "describes points of {size} bytes, while the header says {}",
+                "describes points of {size} bytes, but the header gives {}",
                 header.record_length
             )));
         }

@@ -46,13 +46,13 @@ const CHECKED_REMOTE_CHUNKS: usize = 16;
 enum IndexError {
     #[error("has {0} bytes in its first record, of at least {INFO_BYTES}")]
     Info(usize),
-    #[error("has a cube that is none: half a side of {0} around {1}, {2}")]
+    #[error("has an invalid cube: half a side of {0} around {1}, {2}")]
     Cube(f64, f64, f64),
     #[error("leads to a page of {size} bytes at byte {at}, which is none")]
     Page { at: u64, size: u64 },
     #[error("has more entries than {0} chunks can have, or leads in a circle")]
     TooManyEntries(usize),
-    #[error("has the node {0:?} (level, x, y, z), which lies in no octree")]
+    #[error("has the node {0:?} (level, x, y, z), which lies outside the octree")]
     Node([i32; 4]),
     #[error("has {points} points in {bytes} bytes at byte {at} for the node {node}, and the table of chunks has not")]
     NoChunk { node: Node, at: u64, bytes: i64, points: i64 },

@@ -29,18 +29,18 @@ pub(crate) enum HeaderError {
     TooShort(u64),
     #[error("has LAS version {0}.{1}, but only versions 1.0 to 1.5 can be read; write it again in one of those")]
     Version(u8, u8),
-    #[error("says its header has {size} bytes, but a header of LAS 1.{minor} has {least}; the file is damaged")]
+    #[error("claims a header of {size} bytes, but a header of LAS 1.{minor} has {least}; the file is damaged")]
     Size { size: u16, minor: u8, least: usize },
     #[error("has points of format {0}, but only formats 0 to 10 are known; the file is damaged or newer")]
     PointFormat(u8),
-    #[error("says a point record has {length} bytes, but format {format} needs {least}; the file is damaged")]
+    #[error("claims point records of {length} bytes, but format {format} needs {least}; the file is damaged")]
     RecordLength { length: u16, format: u8, least: u16 },
     #[error(
-        "says its points begin at byte {points_at}, but the header ends at {header} and the file at {file}; the file is damaged \
+        "claims that its points begin at byte {points_at}, but the header ends at {header} and the file at {file}; the file is damaged \
          or cut short"
     )]
     PointsAt { points_at: u64, header: u16, file: u64 },
-    #[error("says it has {0} points, more than any file holds; the file is damaged")]
+    #[error("claims {0} points, more than any file holds; the file is damaged")]
     TooManyPoints(u64),
     #[error("has bounds in its header that are not finite numbers; the file is damaged, so write it again")]
     Bounds,

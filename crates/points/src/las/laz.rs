@@ -49,7 +49,7 @@ impl CompressedPoints {
         warnings: &mut Warnings,
     ) -> Result<CompressedPoints> {
         let Some(vlr) = vlrs.iter().find(|vlr| vlr.is(LazVlr::USER_ID, LazVlr::RECORD_ID)) else {
-            let what = "says its points are compressed, but has no LASzip record; the file is damaged";
+            let what = "claims compressed points, but has no LASzip record; the file is damaged";
             return Err(Error::input(file.path(), what));
         };
         let compression = LazCompression::parse(&vlr.read(file)?, header)

@@ -49,7 +49,7 @@ pub(crate) enum ChunkError {
     Nonsense,
     #[error("its layers do not fit in it")]
     Layers,
-    #[error("it says itself that it has only {0} points")]
+    #[error("by its own count it has only {0} points")]
     FewerPoints(u64),
     #[error("it has {0} bytes, which must be in memory together; write the file again with smaller chunks")]
     TooLarge(u64),

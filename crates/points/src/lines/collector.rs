@@ -223,7 +223,8 @@ impl<'a> FeatureCollector<'a> {
         let kind = value.as_deref().and_then(kind_of_name);
         kind.map(Some).ok_or_else(|| {
             let value = value.map_or("nothing".into(), |value| format!("{value:?}"));
-            let what = format!("has {value} in {name:?}, not line, river or lake: say with kinds what the values mean");
+            let what =
+                format!("has {value} in {name:?}, not line, river or lake: use kinds to map its values to these");
             self.refuse(number, what)
         })
     }
@@ -360,7 +361,8 @@ impl<'a> FeatureCollector<'a> {
         if !line.iter().any(has_height) {
             return Err(self.refuse(
                 number,
-                "has no heights: a breakline takes x, y and z, and measures (M) are no heights. Give it heights (in QGIS: \"Drape\" with an elevation model), or name \
+                "has no heights: a breakline takes x, y and z, and measures (M) are not heights. Give it heights (in QGIS: \"Drape\" \
+                 with an elevation model), or name \
                  an attribute that has them with height_field, or set heights = \"points\" to take them from the points around",
             ));
         }

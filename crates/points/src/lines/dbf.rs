@@ -57,7 +57,7 @@ impl DbfTable {
         header.resize(start.max(held), 0);
         let held = held + read_up_to(&mut file, &mut header[held..]).map_err(failed)?;
         header.truncate(held);
-        let damaged = || Error::input(path, "is damaged or no dBASE table: copy all files of the Shapefile again");
+        let damaged = || Error::input(path, "is damaged or not a dBASE table: copy all files of the Shapefile again");
         let (record, fields) = layout(&header, start).ok_or_else(damaged)?;
         let find = |name: Option<&str>| match name {
             None => Ok(None),

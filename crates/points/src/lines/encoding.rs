@@ -50,7 +50,8 @@ impl Encoding {
     pub(super) fn text(&self, bytes: &[u8]) -> Result<String, String> {
         match &self.unknown {
             Some(name) if std::str::from_utf8(bytes).is_err() => Err(format!(
-                "has a text in the encoding {name:?}, as the .cpg says, which is not known here: write the file anew in UTF-8, for example with \
+                "has a text in the encoding {name:?}, according to the .cpg, which is not supported: write the file anew in UTF-8, for \
+                 example with \
                  `ogr2ogr -lco ENCODING=UTF-8`"
             )),
             _ => Ok(decoded(bytes).into_owned()),

@@ -64,7 +64,7 @@ fn with_null<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<
 /// `Input` if it is no GeoJSON, and those of the collector.
 pub(super) fn read(path: &Path, bytes: &[u8], options: &LineOptions, collector: &mut FeatureCollector) -> Result<Crs> {
     let broken = |error: serde_json::Error| {
-        Error::input(path, format!("is no GeoJSON that can be read: {}", why_no_json(bytes, &error)))
+        Error::input(path, format!("is not readable GeoJSON: {}", why_no_json(bytes, &error)))
     };
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut documents = serde_json::Deserializer::from_slice(text).into_iter::<Document>();
@@ -170,12 +170,12 @@ fn refuse_metres(path: &Path, purpose: LinePurpose, collector: &FeatureCollector
         Some((number, [x, y, _])) => {
             let remedy = match purpose {
                 LinePurpose::Breaklines => {
-                    "and the file says no CRS: set crs in [[breaklines]] to that of its coordinates, such as crs = \
+                    "and the file has no CRS: set crs in [[breaklines]] to that of its coordinates, such as crs = \
                                             \"points\" for the CRS of the points"
                         .into()
                 }
                 LinePurpose::Clip | LinePurpose::Places => {
-                    format!("and the file says no CRS: {}", purpose.remedy_of_crs(path))
+                    format!("and the file has no CRS: {}", purpose.remedy_of_crs(path))
                 }
             };
             Err(collector.refuse(
@@ -196,7 +196,7 @@ fn document_crs(path: &Path, member: Option<&RawValue>, purpose: LinePurpose) ->
     let value = Some(text).filter(|text| text.len() <= LONGEST_CRS).and_then(|text| serde_json::from_str(text).ok());
     value.as_ref().and_then(named_crs).ok_or_else(|| {
         let start: String = text.chars().take(200).collect();
-        let what = format!("its member crs says {start}, which is not known: {}", purpose.remedy_of_crs(path));
+        let what = format!("its member crs is {start}, which is unknown: {}", purpose.remedy_of_crs(path));
         Error::input(path, what)
     })
 }
@@ -360,7 +360,7 @@ mod tests {
     #[test]
     fn what_is_broken_is_named() {
         for (text, word) in [
-            ("{\"type\": \"FeatureCollection\", \"features\": [", "is no GeoJSON"),
+            ("{\"type\": \"FeatureCollection\", \"features\": [", "is not readable GeoJSON"),
             ("{}", "missing field"),
             (r#"{"type": "Topology"}"#, "Topology"),
             (

@@ -129,7 +129,8 @@ fn refuse_open_journal(path: &Path) -> Result<()> {
         _ => return Ok(()),
     };
     let what = format!(
-        "is open in another program, or was not closed (a file {ending} is beside it): close it there first, or open and close it once in QGIS"
+        "is open in another program, or was not closed (there is a file {ending} next to it): close it there first, or open and close \
+         it once in QGIS"
     );
     Err(Error::input(path, what))
 }
@@ -238,7 +239,7 @@ fn add(row: &Row, place: Option<u64>, collector: &mut FeatureCollector) -> rusql
     let geometry = match row.get_ref(1)? {
         ValueRef::Null => Ok(RawGeometry::Empty),
         ValueRef::Blob(bytes) => geometry(bytes),
-        _ => Err("has a geometry that is none: it is no blob".into()),
+        _ => Err("has an invalid geometry: it is not a blob".into()),
     };
     let wanted = WantedAttributes {
         kind: attribute(row.get_ref(2)?),

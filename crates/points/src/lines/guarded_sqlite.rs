@@ -85,7 +85,7 @@ pub(super) fn broken(path: &Path, error: &rusqlite::Error) -> Error {
         Some(ErrorCode::OperationInterrupted) if interrupt::check().is_err() => return Error::Interrupted,
         Some(ErrorCode::OperationInterrupted) => format!("takes too long to read for a file of its size: {how}"),
         Some(ErrorCode::OutOfMemory) => {
-            format!("takes more memory to read than its share of [limits] memory: raise that, or {how}")
+            format!("takes more memory to read than [limits] memory allows: raise that, or {how}")
         }
         // SQLite has no code for a function that is not allowed.
         code if code == Some(ErrorCode::AuthorizationForStatementDenied)
@@ -93,7 +93,7 @@ pub(super) fn broken(path: &Path, error: &rusqlite::Error) -> Error {
         {
             format!("would have SQLite compute what it holds ({}): {how}", what_is_computed(error))
         }
-        _ => format!("is no GeoPackage that can be read: {error}"),
+        _ => format!("is not a readable GeoPackage: {error}"),
     };
     Error::input(path, what)
 }

@@ -120,7 +120,7 @@ fn warn_of_missing(file: &mut LineFile, own: &Crs, points: &Crs) {
 }
 
 fn assumed(names: &str) -> String {
-    format!("a datum is unknown: {names} are assumed to be one, though two datums may be hundreds of metres apart")
+    format!("a datum is unknown: {names} are assumed to be the same, though two datums may be hundreds of metres apart")
 }
 
 /// Transforms the features of `file`, which are in the system `own`, into that of the points.
@@ -128,11 +128,11 @@ fn transform(file: &mut LineFile, own: &Crs, points: &SystemOfPoints, has_height
     let crs = points.crs;
     let refuse = |why: &str| other_system(file, own, points.crs, why);
     if !crs.is_named() {
-        return Err(refuse("the points do not say where they are"));
+        return Err(refuse("the CRS of the points is unknown"));
     }
     let heights = own.vertical_system.as_ref().zip(crs.vertical_system.as_ref());
     if let Some(difference) = heights.and_then(|(own, others)| own.difference(others)) {
-        return Err(refuse(&format!("they differ in {difference}, and the way between such heights needs a geoid")));
+        return Err(refuse(&format!("they differ in {difference}, and converting between such heights needs a geoid")));
     }
     let way = CrsTransform::between(own, crs, points.datums).map_err(|why| refuse(&why))?;
     let target = crs.label();
@@ -188,13 +188,13 @@ fn other_system(file: &LineFile, own: &Crs, points: &Crs, why: &str) -> Error {
     let points = if points.is_named() { points.label() } else { "a plane without a CRS".into() };
     let remedy = match file.purpose {
         LinePurpose::Breaklines => {
-            "say what it is with crs in [[breaklines]], such as crs = \"points\" for the CRS of the points".into()
+            "set crs in [[breaklines]], such as crs = \"points\" for the CRS of the points".into()
         }
         LinePurpose::Clip | LinePurpose::Places => file.purpose.remedy_of_crs(&file.path),
     };
     Error::Config(format!(
-        "{path} is in {}, but the points are in {points}: {why}. Transform the {features} first, {how}; if what the file says is wrong, \
-         {remedy}",
+        "{path} is in {}, but the points are in {points}: {why}. Transform the {features} first, {how}; if the CRS of the file is \
+         wrong, {remedy}",
         own.label()
     ))
 }
@@ -294,7 +294,7 @@ mod tests {
                 .replace("6269", "0"),
         );
         let said = lines(&nameless, DatumRule::Strict);
-        assert!(said.contains("an unnamed datum and NAD83 are assumed to be one"), "{said}");
+        assert!(said.contains("an unnamed datum and NAD83 are assumed to be the same"), "{said}");
         let there = zone_15.clone();
         assert_eq!(lines(&there, DatumRule::Strict), "");
     }
@@ -318,10 +318,10 @@ mod tests {
             (&old, &zone_15, "us_noaa_conus.tif"),
             (&wgs84, &zone_15, "datums"),
             // Nothing says that these differ, and nothing that they are the same.
-            (&projected_somehow, &zone_15, "does not say its projection"),
-            (&unnamed, &zone_15, "does not say its projection"),
-            (&zone_15, &unnamed, "do not say where they are"),
-            (&degrees, &Crs::default(), "do not say where they are"),
+            (&projected_somehow, &zone_15, "has no readable projection"),
+            (&unnamed, &zone_15, "has no readable projection"),
+            (&zone_15, &unnamed, "the CRS of the points is unknown"),
+            (&degrees, &Crs::default(), "the CRS of the points is unknown"),
         ] {
             let error = bring(own, "auto", points).unwrap_err();
             assert_eq!(error.kind(), ErrorKind::Usage);

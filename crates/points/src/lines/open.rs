@@ -15,7 +15,7 @@ const SIDE_FILES: [&str; 13] =
 
 /// What to say about a file of another format.
 const OTHER_FORMAT: &str =
-    "is no Shapefile, GeoPackage or GeoJSON: convert it first, for example with `ogr2ogr lines.gpkg FILE`";
+    "is not a Shapefile, GeoPackage or GeoJSON: convert it first, for example with `ogr2ogr lines.gpkg FILE`";
 
 /// Tells whether the file at `path` belongs to a file of lines, and is none itself.
 pub fn is_side_file(path: &Path) -> bool {

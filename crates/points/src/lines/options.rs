@@ -78,7 +78,7 @@ impl LinePurpose {
     /// Returns what to do about the file at `path` if it states no CRS that can be used.
     pub fn remedy_of_crs(self, path: &Path) -> String {
         match self {
-            LinePurpose::Breaklines => "say with crs in [[breaklines]] what the lines are in".into(),
+            LinePurpose::Breaklines => "set crs in [[breaklines]] to the CRS of the lines".into(),
             LinePurpose::Clip | LinePurpose::Places => {
                 format!(
                     "write the right one into it, for example with `ogr2ogr -a_srs EPSG:26915 corrected.gpkg {}`",
@@ -137,9 +137,7 @@ impl LineOptions {
         }
         match (&self.kind, &self.kind_field, &self.kinds) {
             (Some(_), Some(_), _) => Some("[[breaklines]] kind and kind_field are both set: keep one of them"),
-            (_, None, Some(_)) => {
-                Some("[[breaklines]] kinds says what the values of kind_field mean: set kind_field too")
-            }
+            (_, None, Some(_)) => Some("[[breaklines]] kinds maps the values of kind_field: set kind_field too"),
             _ => None,
         }
     }
@@ -232,7 +230,7 @@ impl TryFrom<String> for LineCrs {
     fn try_from(text: String) -> Result<LineCrs, String> {
         let refused = |text: &str| {
             format!(
-                "crs of [[breaklines]] is \"auto\", \"points\" (that of the points, whatever the files say), an EPSG code such as \
+                "crs of [[breaklines]] is \"auto\", \"points\" (that of the points, which overrides the files), an EPSG code such as \
                  \"EPSG:26915\", or well-known text, not {text:?}"
             )
         };

@@ -72,7 +72,7 @@ fn records<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8]> {
     // In words of 16 bits.
     let length = 2 * big(&header[24..]) as usize;
     if length > bytes.len() {
-        let what = format!("is cut off: its header says {length} bytes, and it has {}; copy it again", bytes.len());
+        let what = format!("is cut off: its header gives {length} bytes, but it has {}; copy it again", bytes.len());
         return Err(Error::input(path, what));
     }
     Ok(&bytes[HEADER..length.max(HEADER)])
@@ -139,7 +139,7 @@ fn attributes(path: &Path, options: &LineOptions) -> Result<Option<DbfTable>> {
         }
         None => Err(Error::input(
             path,
-            "its attributes are missing, the .dbf file beside it: copy all files of the Shapefile, or leave out kind_field and \
+            "its attributes are missing, the .dbf file next to it: copy all files of the Shapefile, or leave out kind_field and \
              height_field",
         )),
     }
@@ -159,7 +159,7 @@ fn crs(path: &Path, purpose: LinePurpose, warnings: &mut Warnings) -> Result<Crs
     file.take(LONGEST_PRJ).read_to_end(&mut text).map_err(Error::io("read", &prj))?;
     let text = String::from_utf8_lossy(&text);
     parse(text.trim_start_matches('\u{feff}').trim())
-        .ok_or_else(|| Error::input(&prj, format!("is no well-known text of a CRS: {}", purpose.remedy_of_crs(path))))
+        .ok_or_else(|| Error::input(&prj, format!("is not well-known text of a CRS: {}", purpose.remedy_of_crs(path))))
 }
 
 /// Returns the files that are read with the `.shp` at `path`: itself, its attributes, its CRS, and how its texts are written.

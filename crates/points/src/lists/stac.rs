@@ -109,7 +109,7 @@ impl Reader {
             clouds.extend(document.clouds(&path)?);
             let leads_to = document.leads_to(&path)?;
             if !leads_to.is_empty() && way.len() > DEEPEST {
-                return Err(Error::input(&path, format!("is {DEEPEST} links away from the list: name it by itself")));
+                return Err(Error::input(&path, format!("is {DEEPEST} links away from the list: name it directly")));
             }
             if let Some(circle) = leads_to.iter().find(|place| way.contains(place)) {
                 let what = format!("leads back to {}, which leads to it", circle.display());
@@ -148,10 +148,7 @@ impl Reader {
         };
         read.map_err(|error| match error.is_io() {
             true => Error::io("read", path)(error.into()),
-            false => Error::input(
-                path,
-                format!("is no list of point clouds in JSON (STAC or VPC) that can be read: {error}"),
-            ),
+            false => Error::input(path, format!("is not a readable JSON list of point clouds (STAC or VPC): {error}")),
         })
     }
 }
@@ -169,10 +166,13 @@ impl Document {
             "Feature" => add_clouds(path, (&self.id, 0), &self.properties, &self.assets, &mut clouds)?,
             "Collection" | "Catalog" => {}
             _ if self.hierarchy.is_some() => {
-                return Err(Error::input(path, format!("is the index of an EPT: call it {EPT}, as its producer did")));
+                return Err(Error::input(
+                    path,
+                    format!("is the index of an EPT: rename it to {EPT}, its original name"),
+                ));
             }
             _ => {
-                let what = "is JSON, but no list of point clouds: neither a virtual point cloud (VPC) nor an item, an item collection, \
+                let what = "is JSON, but not a list of point clouds: neither a virtual point cloud (VPC) nor an item, an item collection, \
                             a collection or a catalogue of STAC";
                 return Err(Error::input(path, what));
             }
@@ -199,8 +199,7 @@ impl Document {
     fn next(&self, path: &Path) -> Result<Option<PathBuf>> {
         let Some(link) = self.links.iter().find(|link| link.rel == "next") else { return Ok(None) };
         if link.method.as_ref().is_some_and(|method| !method.eq_ignore_ascii_case("get")) {
-            let what = "has a next page that must be asked for by POST, which is not done: name the items of a collection instead, \
-                        which come by GET";
+            let what = "has a next page that needs a POST request, which is not supported: name the items of a collection instead";
             return Err(Error::input(path, what));
         }
         link.place(path).map(Some)
@@ -386,15 +385,15 @@ mod tests {
         let unnamed = empty.replace(r#""id": "a", "#, "");
         assert!(error(&[("l.vpc", &unnamed)]).contains("item 1: has no asset"));
         let ftp = ITEM.replace("./tile.copc.laz", "ftp://host/tile.copc.laz");
-        assert!(error(&[("l.json", &ftp)]).contains("item \"tile-1\": files are read by https://"));
+        assert!(error(&[("l.json", &ftp)]).contains("item \"tile-1\": files can be read by https://"));
         assert!(error(&[("l.json", "{\"type\": 1}")]).contains("at line 1 column"));
-        assert!(error(&[("l.json", "{}")]).contains("no list of point clouds"));
+        assert!(error(&[("l.json", "{}")]).contains("not a list of point clouds"));
         assert!(error(&[("l.json", r#"{"hierarchyType": "json"}"#)]).contains("call it ept.json"));
         let circle = r#"{"type": "Catalog", "links": [{"rel": "child", "href": "l.json"}]}"#;
         assert!(error(&[("l.json", circle)]).contains("leads back to"));
         let next = r#"{"type": "FeatureCollection", "links": [{"rel": "next", "href": "l.json"}]}"#;
         assert!(error(&[("l.json", next)]).contains("which was before"));
         let post = next.replace(r#""href""#, r#""method": "POST", "href""#);
-        assert!(error(&[("l.json", &post)]).contains("by POST"));
+        assert!(error(&[("l.json", &post)]).contains("POST"));
     }
 }

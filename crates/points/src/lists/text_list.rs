@@ -119,6 +119,6 @@ mod tests {
         let error = clouds(b"tiles of 2024\na.laz\nb.laz\n").unwrap_err().to_string();
         assert!(error.contains("line 1: \"tiles of 2024\" is not a point cloud"), "{error}");
         let error = clouds(b"a.laz\nftp://host/b.laz\n").unwrap_err().to_string();
-        assert!(error.contains("line 2: files are read by https://"), "{error}");
+        assert!(error.contains("line 2: files can be read by https://"), "{error}");
     }
 }

@@ -260,7 +260,7 @@ pub fn who_has(SharedHeight { value, count, first }: &SharedHeight, record: &str
 
 fn real_nodata(height: &SharedHeight, [low, high]: [f64; 2], record: &str) -> String {
     format!(
-        "{}, which [input] nodata leaves out, though they may be real, as the sea is: the other heights lie from {low} to {high}; fix: \
+        "{}, which [input] nodata leaves out, though they may be real, like the sea: the other heights lie from {low} to {high}; fix: \
          if they are real, set [input] nodata = \"none\"",
         who_has(height, record)
     )
@@ -270,7 +270,7 @@ fn real_nodata(height: &SharedHeight, [low, high]: [f64; 2], record: &str) -> St
 pub(crate) fn left_out(height: &SharedHeight, record: &str) -> String {
     // Nothing keeps a height that no lattice holds.
     let remedy = if height.value.abs() < NO_HEIGHT { "; fix: [input] nodata = \"none\" keeps them" } else { "" };
-    format!("{}, far from all others: taken for nodata and left out{remedy}", who_has(height, record))
+    format!("{}, far from all others: treated as nodata and left out{remedy}", who_has(height, record))
 }
 
 #[cfg(test)]

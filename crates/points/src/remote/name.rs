@@ -47,7 +47,7 @@ pub fn public_name(url: &str) -> std::result::Result<String, String> {
     let rest = url.get(found.len() + 3..).unwrap_or_default();
     let Some(known) = SCHEMES.into_iter().find(|known| found.eq_ignore_ascii_case(known)) else {
         return Err(format!(
-            "files are read by https://, http:// and s3://, not by {found}://: copy them to this machine, or name them by https://"
+            "files can be read by https://, http:// and s3://, not by {found}://: download them, or use an https:// URL"
         ));
     };
     if known == "s3" {
@@ -67,11 +67,13 @@ pub fn public_name(url: &str) -> std::result::Result<String, String> {
         return Err(format!("{place} names no file: name each file of the server"));
     }
     if path.contains('*') {
-        return Err(format!("{place}: no web server lists its files, so name each one (%2A is a star in a name)"));
+        return Err(format!(
+            "{place}: web servers do not list their files, so name each one (%2A is a star in a name)"
+        ));
     }
     if !place.chars().all(|c| c.is_ascii_graphic()) {
         return Err(format!(
-            "{place}: a URL has no blanks and no letters beyond ASCII: write them as %20 and the like"
+            "{place}: a URL must not contain spaces or non-ASCII characters: encode them, such as %20 for a space"
         ));
     }
     Ok(query.map_or(place.clone(), |query| hide(place, query)))
@@ -117,7 +119,9 @@ pub(crate) fn address(name: &str) -> Result<String> {
     let queries = QUERIES.lock().unwrap_or_else(PoisonError::into_inner);
     let query = queries.get(place).and_then(|known| known.get(number.saturating_sub(1)));
     query.map(|query| format!("{place}?{query}")).ok_or_else(|| {
-        Error::Config(format!("{name}: the query of this URL is written down nowhere: name it in the configuration"))
+        Error::Config(format!(
+            "{name}: the query of this URL is not stored: write the whole URL into the configuration"
+        ))
     })
 }
 

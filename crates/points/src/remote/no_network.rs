@@ -14,8 +14,7 @@ pub(crate) enum RemoteStream {}
 
 fn not_built_in(name: &Path) -> Error {
     Error::Config(format!(
-        "{}: this program was built without inputs by URL: build it with the feature `remote` (which is on by default), or download the \
-         file",
+        "{}: this build of gdt-batch cannot read URLs: build it with the feature `remote` (on by default), or download the file",
         name.display()
     ))
 }
@@ -122,10 +121,7 @@ mod tests {
     fn the_refusal_says_how_to_get_the_feature() {
         let Err(error) = HeldFile::open(Path::new("https://host/a.laz"));
         assert_eq!(error.kind(), ErrorKind::Usage);
-        assert!(
-            error.to_string().contains("https://host/a.laz: this program was built without inputs by URL"),
-            "{error}"
-        );
+        assert!(error.to_string().contains("https://host/a.laz: this build of gdt-batch cannot read URLs"), "{error}");
         assert_eq!(files_at("s3://bucket/*.laz").unwrap_err().kind(), ErrorKind::Usage);
     }
 }

@@ -59,7 +59,7 @@ impl Source {
             ),
             None => match upright(&places) {
                 Some([across, z]) => format!(
-                    "its points would stand upright near the equator, {:.0} m high and {:.0} m wide: x and y are those of a map",
+                    "its points would be vertical near the equator, {:.0} m high and {:.0} m wide: x and y are those of a map",
                     across * metres,
                     z * metres
                 ),
@@ -69,13 +69,14 @@ impl Source {
         let stated = Some(self.crs.horizontal).filter(|unit| *unit != Unit::Unknown);
         let label = self.crs.label();
         self.warnings.push(if is_crs_stated {
-            format!("its geocentric coordinate system ({label}) is ignored, because [input] names another")
+            format!("its geocentric coordinate system ({label}) is ignored, because [input] sets another")
         } else {
             let in_unit = stated.map_or_else(String::new, |unit| {
                 format!(" in {}", unit.name())
             });
             format!(
-                "its coordinate system ({label}) is geocentric, but {why}: the record is ignored, and x and y are a plane{in_unit}; \
+                "its coordinate system ({label}) is geocentric, but {why}: the record is ignored, and x and y are treated as a \
+                 plane{in_unit}; \
                  fix: [input] crs = \"EPSG:...\""
             )
         });

@@ -282,7 +282,7 @@ fn unknown_units(found: Option<&NamedColumns>) -> Option<String> {
 fn names_warning(found: Option<&NamedColumns>, is_foot_unclear: bool, columns: usize) -> Option<String> {
     let warning = match found {
         None if columns > 3 => {
-            "it has no header, so its first three columns are x, y and z; fix: [input.csv] columns, if that is wrong"
+            "it has no header, so its first three columns are taken as x, y and z; fix: [input.csv] columns, if that is wrong"
         }
         Some(_) if is_foot_unclear => {
             "its columns are in feet of an unknown kind: international feet (0.3048 m) assumed; fix: us-ft in the names of its columns, as \

@@ -63,8 +63,8 @@ pub(crate) fn names_in_comments(
     match misfit {
         None => Ok(CommentNames { named: None, words }),
         Some((line, names)) => Err(format!(
-            "the comment {} names x, y and z, but it has {names} words and the rows have {} columns: say which is which with `columns` under \
-             [input.csv]{}",
+            "the comment {} names x, y and z, but it has {names} words and the rows have {} columns: name the columns with `columns` \
+             under [input.csv]{}",
             shown(line),
             rows.columns().max().unwrap_or(0),
             if rows.may_have_decimal_commas(Delimiter::Byte(b',')) {

@@ -69,7 +69,8 @@ impl Comments<'_> {
         }
         let (line, _) = order.or(list.map(|(line, doubt, _)| (line, doubt)))?;
         Some(UnreadHeader::Possible(format!(
-            "the comment {} may name the columns: the first three are taken for x, y and z; say otherwise with `columns` under [input.csv]",
+            "the comment {} may name the columns: the first three are taken as x, y and z; if that is wrong, set `columns` under \
+             [input.csv]",
             shown(line)
         )))
     }

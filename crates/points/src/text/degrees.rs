@@ -25,7 +25,7 @@ pub(crate) fn warning(rows: &RowBox, decimals: &[u8; 3]) -> Option<String> {
         return None;
     }
     Some(format!(
-        "its x ({} to {}) and y ({} to {}) look like longitude and latitude, but are taken as lengths; fix: [input] crs = \"EPSG:4326\" \
+        "its x ({} to {}) and y ({} to {}) look like longitude and latitude, but are treated as lengths; fix: [input] crs = \"EPSG:4326\" \
          and [input] to_crs = \"utm\", if they are degrees",
         rows.min[0], rows.max[0], rows.min[1], rows.max[1]
     ))

@@ -16,7 +16,7 @@ pub(crate) enum HeaderLineError {
          a tab or spaces between them"
     )]
     NoNames,
-    #[error("is no number of points as PTS begins with, which is in digits alone: write it so, or remove the line")]
+    #[error("is not a point count as in PTS, which has only digits: correct it, or remove the line")]
     NoCount,
     #[error("is too large for a number of points: correct it, or remove the line")]
     LargeCount,

@@ -87,7 +87,7 @@ impl FirstHeader {
         match self.comment_names(line, marks) {
             Ok(CommentNames { named: Some(other), .. }) => self.is_other(&other).then(|| {
                 let what =
-                    if self.is_in_place(&other) { "gives the columns other units" } else { "names other columns" };
+                    if self.is_in_place(&other) { "gives the columns different units" } else { "names other columns" };
                 format!("the {kind} {} {what} than {}: {REMEDY}", shown(line), self.what)
             }),
             Ok(CommentNames { words: Some(_), .. }) => None,

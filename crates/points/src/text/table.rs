@@ -223,7 +223,7 @@ impl TextTable {
                 table.unit = Unit::Degree;
             } else {
                 warnings.push(format!(
-                    "its columns are named longitude and latitude, but are not degrees (x {} to {}, y {} to {}): they are read as \
+                    "its columns are named longitude and latitude, but are not degrees (x {} to {}, y {} to {}): they are treated as \
                      lengths; fix: convert them to decimal degrees first",
                     min[0], max[0], min[1], max[1]
                 ));
@@ -493,7 +493,7 @@ fn refuse_tiny(file: &RandomAccessFile, found: &Findings) -> Result<()> {
     Err(Error::input(
         file.path(),
         format!(
-            "has no x or y beyond {TINY:e}, and more decimals than {MOST_DECIMALS} are not read: write it in a smaller unit, such as \
+            "has no x or y beyond {TINY:e}, and at most {MOST_DECIMALS} decimals are read: write it in a smaller unit, such as \
              micrometres"
         ),
     ))

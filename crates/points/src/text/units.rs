@@ -115,7 +115,7 @@ impl TextUnits {
             match (*own, below) {
                 (Some(named), Some(below)) if named != below => {
                     let (axis, named, below) = (AXIS_NAMES[axis], named.name, below.name);
-                    return Err(format!("says {named} for {axis}, and the line below it says {below}"));
+                    return Err(format!("has {named} for {axis}, but the line below it has {below}"));
                 }
                 _ => *own = own.or(below),
             }
@@ -137,11 +137,11 @@ impl TextUnits {
         if let (Some(x), Some(y)) = (x, y)
             && x != y
         {
-            return Err(format!("says {} for x and {} for y: write both in one unit", x.name, y.name));
+            return Err(format!("has {} for x and {} for y: write both in one unit", x.name, y.name));
         }
         let horizontal = x.or(y);
         if let Some(z) = z.filter(|z| z.metres.is_none()) {
-            return Err(format!("says {} for z: write heights in metres", z.name));
+            return Err(format!("has {} for z: write heights in metres", z.name));
         }
         let unit = horizontal.map_or(Unit::Unknown, |unit| unit.metres.map_or(Unit::Degree, of_length));
         Ok(UnitsOfAxes {

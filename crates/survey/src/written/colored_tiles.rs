@@ -53,7 +53,7 @@ impl<'a> ColoredTiles<'a> {
     /// Writes the main file of the tileset, with the legend in the extras of its asset. Returns whose the data are, if it says that.
     fn write_tileset(&self, folder: &DifferenceFolder) -> Result<Option<String>> {
         let after = self.compared.terrains[1];
-        let broken = || Error::input(after.directory().join(TILESET), "is no tileset: run the job again");
+        let broken = || Error::input(after.directory().join(TILESET), "is not a tileset: run the job again");
         let mut tileset: Value = serde_json::from_slice(&after.read_file(TILESET)?).map_err(|_| broken())?;
         let asset = tileset.get_mut("asset").and_then(Value::as_object_mut).ok_or_else(broken)?;
         let copyright = asset.get("copyright").and_then(Value::as_str).map(str::to_owned);

@@ -90,7 +90,7 @@ impl<'a> DifferenceRaster<'a> {
         let step = compared.lattice.step_lengths()[0];
         refuse_too_many(resolution, [0, 1].map(|axis| (common.max[axis] - common.min[axis]) as f64 * step))?;
         let refuse = |what: String| Error::Config(format!("--resolution {resolution} {what}"));
-        let side = CellSize::of(resolution).ok_or_else(|| refuse("is no side of a cell".into()))?;
+        let side = CellSize::of(resolution).ok_or_else(|| refuse("is not a cell size".into()))?;
         let alignment = CellAlignment { origin: [Decimal::ZERO; 2], resolution: side.exact() };
         let lattices = compared.terrains.map(FinishedTerrain::lattice);
         let bounds = compared.lattice.ways[0].around(common);

@@ -93,7 +93,7 @@ impl Names<'_> {
     fn disagreement(&self, &Disagreement { place, kept, other }: &Disagreement) -> String {
         format!(
             "[[breaklines]]: heights disagree at {} where lines meet; the worst is {}: {} has the height {}, which is used, and {} has \
-             {} (a lake goes before a river, a river before a line, the lower before the higher)",
+             {} (lakes take precedence over rivers, rivers over lines, lower heights over higher ones)",
             counted(self.findings.disagreements, "place"),
             self.at(place),
             self.feature(kept.0),

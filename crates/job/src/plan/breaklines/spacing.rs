@@ -24,7 +24,8 @@ pub(super) fn spacing(all: &[LineOptions], lattice: &Lattice, extent: &Extent, a
         [] => Ok(mean_distance(lattice, extent, area, records)),
         [length] => Ok((length / to_float(lattice.resolution)).round().clamp(1.0, f64::from(LONGEST)) as u32),
         [first, second, ..] => Err(Error::Config(format!(
-            "[[breaklines]] spacing is {first} in one entry and {second} in another: lines that meet are cut alike, so say the same in all"
+            "[[breaklines]] spacing is {first} in one entry and {second} in another: set the same in all entries, because lines that \
+             meet are divided alike"
         ))),
     }
 }

@@ -181,7 +181,7 @@ impl<'a> ExportWork<'a> {
         (plane_name != height_name && !self.formats.is_empty()).then(|| {
             let names: Vec<&str> = self.formats.iter().map(|format| format.file_name()).collect();
             format!(
-                "{}: heights are in {height_name}, x and y in {plane_name}, and programs take one unit for all; fix: scale the heights \
+                "{}: heights are in {height_name}, x and y in {plane_name}, and programs expect one unit for all; fix: scale the heights \
                  there",
                 names.join(", ")
             )

@@ -96,7 +96,7 @@ impl WebMap {
         let turn = [0.0, -2.0 * PI, 2.0 * PI].into_iter().find(is_there);
         turn.ok_or_else(|| {
             format!(
-                "this program finds no way from longitude and latitude back to {}; transform the points to a UTM zone with [input] to_crs \
+                "gdt-batch cannot transform longitude and latitude back to {}; transform the points to a UTM zone with [input] to_crs \
                  = \"utm\"",
                 crs.label()
             )

@@ -146,17 +146,16 @@ pub(crate) fn refusal(answer: Response<Body>, address: &Address) -> Failure {
     let advice = match (status.as_u16(), region) {
         (301 | 307 | 400, Some(region)) if is_s3 => format!("; the bucket is in another region: set AWS_REGION={region}"),
         (401 | 403, _) if is_s3 => {
-            "; look at AWS_ACCESS_KEY_ID and what it may read. Of an object that is not there S3 says the same to those who may not \
-             list the bucket"
+            "; check AWS_ACCESS_KEY_ID and its permissions. S3 also answers this for a missing object if the key may not list the bucket"
                 .into()
         }
-        (401 | 403, _) => "; if the URL has a signature, that may have expired: a new one may be put in its place".into(),
+        (401 | 403, _) => "; a signature in the URL may have expired: replace it by a new one".into(),
         _ => String::new(),
     };
     let reason = if is_s3 { reason_of_s3(answer) } else { String::new() };
     Failure {
         pause: seconds.map(Duration::from_secs),
-        ..Failure::new(kind, format!("the server says {status}{reason}{advice}"))
+        ..Failure::new(kind, format!("the server answered {status}{reason}{advice}"))
     }
 }
 

@@ -49,18 +49,17 @@ impl Failure {
         };
         use ureq::Timeout::{Connect, Resolve};
         let (kind, what) = match error {
-            HostNotFound => (
-                FailureKind::Unreachable,
-                format!("the server {host} is not known here: correct its name, or look after the network"),
-            ),
+            HostNotFound => {
+                (FailureKind::Unreachable, format!("unknown host {host}: correct its name, or check the network"))
+            }
             Timeout(Connect | Resolve) => (
                 FailureKind::Unreachable,
-                format!("the server {host} cannot be reached: it does not answer; look after the network"),
+                format!("the server {host} cannot be reached: it does not answer; check the network"),
             ),
             // The resolver has no kind of its own for this.
             Io(error) if error.to_string().contains("lookup address") => (
                 FailureKind::Unreachable,
-                format!("the server {host} is not known here ({error}): correct its name, or look after the network"),
+                format!("unknown host {host} ({error}): correct its name, or check the network"),
             ),
             Timeout(_) => (FailureKind::Passing, "the server did not answer in time".into()),
             Io(error) if error.kind() == ErrorKind::ConnectionRefused => {
@@ -70,24 +69,23 @@ impl Failure {
             Io(error) if error.kind() == ErrorKind::InvalidData => {
                 (FailureKind::Refused, no_tls(host, &error.to_string()))
             }
-            Io(error) if error.kind() == ErrorKind::NetworkUnreachable => (
-                FailureKind::Unreachable,
-                format!("the server {host} cannot be reached: {error}; look after the network"),
-            ),
+            Io(error) if error.kind() == ErrorKind::NetworkUnreachable => {
+                (FailureKind::Unreachable, format!("the server {host} cannot be reached: {error}; check the network"))
+            }
             Rustls(error) => (FailureKind::Refused, no_tls(host, &error.to_string())),
             Io(error) => (FailureKind::Passing, format!("the connection failed: {error}")),
             ConnectProxyFailed(_) => (FailureKind::Unreachable, "the proxy did not make the connection".into()),
-            TooManyRedirects => (FailureKind::Refused, "the server redirects without an end".into()),
+            TooManyRedirects => (FailureKind::Refused, "the server redirects endlessly".into()),
             // The URL of a job has a scheme that is read, so a redirect led to this one.
             RequireHttpsOnly(place) => (FailureKind::Refused, not_followed("https", &place)),
             BadUri(what) if what.starts_with("unknown scheme") => (FailureKind::Refused, not_followed("http", &what)),
             Protocol(error) if error.to_string().contains("location header") => (
                 FailureKind::Refused,
-                "the server redirects to what is no URL of http:// or https://: correct the URL".into(),
+                "the server redirects to an address that is neither http:// nor https://: correct the URL".into(),
             ),
-            Protocol(error) => (FailureKind::Passing, format!("the answer is no HTTP: {error}")),
+            Protocol(error) => (FailureKind::Passing, format!("the answer is not HTTP: {error}")),
             // Others may name the URL with its query.
-            _ => (FailureKind::Refused, "the request cannot be made: look at the URL".into()),
+            _ => (FailureKind::Refused, "the request is invalid: check the URL".into()),
         };
         Failure::new(kind, what)
     }
@@ -112,9 +110,9 @@ fn not_followed(from: &str, place: &str) -> String {
     let before = place.split("://").next().unwrap_or_default();
     let scheme = before.rsplit(|c: char| !c.is_ascii_alphanumeric() && !"+-.".contains(c)).next().unwrap_or_default();
     let why = match scheme {
-        "http" => "which is not safe and not followed: name the place itself, with http://",
+        "http" => "which is not safe and not followed: use the http:// URL itself",
         _ => {
-            "which is not followed, because files are read by https:// and http:// only: correct the URL, or ask who runs the server"
+            "which is not followed, because only https:// and http:// are supported: correct the URL, or ask the server's operator"
         }
     };
     format!("the server redirects from {from} to {scheme}, {why}")
@@ -124,10 +122,9 @@ fn not_followed(from: &str, place: &str) -> String {
 fn no_tls(host: &str, error: &str) -> String {
     if error.contains("certificate") {
         format!(
-            "the certificate of {host} is not trusted ({error}): the authorities of this system are; SSL_CERT_FILE names a file with \
-             others"
+            "the certificate of {host} is not trusted ({error}): SSL_CERT_FILE can name a file with other certificate authorities"
         )
     } else {
-        format!("no https with {host} ({error}): correct the URL if that is a server of http://")
+        format!("TLS failed with {host} ({error}): if it is a plain http:// server, correct the URL")
     }
 }

@@ -49,8 +49,7 @@ impl HeldFile {
 
     /// Returns what the user should know about it.
     pub(crate) fn doubt(&self) -> Option<&'static str> {
-        const DOUBT: &str = "its server says neither ETag nor Last-Modified, so a change of its content that leaves its size and its \
-                             beginning as they are is not noticed";
+        const DOUBT: &str = "its server sends neither ETag nor Last-Modified, so a change is noticed only in its size and its first 32 KiB";
         (!self.file.is_sure()).then_some(DOUBT)
     }
 

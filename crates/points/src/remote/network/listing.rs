@@ -67,14 +67,14 @@ pub(crate) fn files_at(name: &str) -> Result<Vec<String>> {
 /// Why a list is not read to its end.
 #[derive(Debug, thiserror::Error)]
 enum ListError {
-    #[error("the server repeats parts of the list of the bucket, so the list never ends: name each object by itself")]
+    #[error("the server repeats parts of the bucket's list, so the list never ends: name each object")]
     Repeated,
     #[error(
-        "the list of the bucket has more than {MOST_PAGES} pages of objects: write more of their names before the first star"
+        "the list of the bucket has more than {MOST_PAGES} pages of objects: use a longer prefix before the first star"
     )]
     Pages,
     #[error(
-        "more than {MOST_OBJECTS} objects match, or their names have more than {} MiB: make several jobs, each with a pattern for fewer",
+        "more than {MOST_OBJECTS} objects match, or their names have more than {} MiB: split the job, with narrower patterns",
         MOST_BYTES >> 20
     )]
     Objects,
@@ -144,9 +144,8 @@ fn page(address: Address, name: &str) -> Result<Page> {
     let outcome = Pending::begin(0..0, fetch).wait()?;
     let text = outcome.map_err(|failure| failure.into_error(name.as_ref(), "the list of the bucket: "))?;
     let text = String::from_utf8_lossy(&text.bytes);
-    parse(&text).ok_or_else(|| {
-        Error::Config(format!("{name}: the server does not list buckets as S3 does: name each object by itself"))
-    })
+    parse(&text)
+        .ok_or_else(|| Error::Config(format!("{name}: the server does not list buckets as S3 does: name each object")))
 }
 
 fn parse(text: &str) -> Option<Page> {

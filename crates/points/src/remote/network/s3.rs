@@ -44,7 +44,7 @@ impl S3Settings {
             return Err("needs a URL in AWS_ENDPOINT_URL, such as https://s3.example.org, without a password".into());
         }
         if endpoint.as_ref().is_some_and(|url| !url.starts_with("https://")) && !is_set("AWS_ALLOW_HTTP") {
-            return Err("goes by https:// only: set AWS_ALLOW_HTTP=true if AWS_ENDPOINT_URL may be another".into());
+            return Err("uses https:// only: set AWS_ALLOW_HTTP=true to allow an http:// AWS_ENDPOINT_URL".into());
         }
         let credentials = match (variable("AWS_ACCESS_KEY_ID"), variable("AWS_SECRET_ACCESS_KEY")) {
             _ if is_set("AWS_SKIP_SIGNATURE") => None,
