@@ -268,7 +268,7 @@ impl Done {
         let mut ends = self.starts();
         ends.rotate_left(1);
         for ((name, start), (_, end)) in self.starts().into_iter().zip(ends) {
-            let end = if end > start { end } else { f64::INFINITY };
+            let end = if end > start { end } else { wall };
             let within = || self.samples.iter().filter(|sample| (start..end).contains(&sample.at));
             let all: f64 = within().map(|sample| sample.seconds).sum();
             let one: f64 = within().filter(|sample| sample.busy <= 1).map(|sample| sample.seconds).sum();
