@@ -37,6 +37,8 @@
 //!
 //! Together with the number of sites in the report this proves that no site that the job has read is missing.
 //!
+//! All of this needs each tile once. [`GrowingProof`] takes them as a job writes them, and comes to the same verdict when they are gone.
+//!
 //! # Triangles that are left out
 //!
 //! The triangles that `[output] hull`, `max_edge` and `[input] clip` leave out of the terrain are in `cut/`. All checks are made on the triangles in `tiles/`
