@@ -1,10 +1,11 @@
-//! How large a job can this machine do? `cargo bench --bench record [-- [FILE.laz] [COPIES...] [--keep] [--in FOLDER] [--free GIB]]`.
+//! How large a job can this machine do? `cargo bench --bench record [-- [FILE.laz] [COPIES...] [--keep] [--in FOLDER] [--memory MIB]
+//! [--free GIB]]`.
 //!
 //! The cloud of a job is one file many times, side by side, which a server in this process hands out (`copies`). So the points take no disk,
-//! and the temporary files of the job alone bound its size. For each number of COPIES the program runs once, with two threads,
-//! `memory = "256 MiB"`, plain tiles and a tileset. Every tile is checked as soon as the job has published it, and then truncated, so the
-//! results take no disk either. The verdict is that of `gdt-batch verify`: each tile is read once, and the borders of all are matched
-//! when the job is done ([`verify::GrowingProof`]). The program knows nothing of this.
+//! and the temporary files of the job alone bound its size. For each number of COPIES the program runs once, with two threads, a memory of
+//! MIB (256 by default), plain tiles and a tileset. Every tile is checked as soon as the job has published it, and then truncated, so
+//! the results take no disk either. The verdict is that of `gdt-batch verify`: each tile is read once, and the borders of all are
+//! matched when the job is done ([`verify::GrowingProof`]). The program knows nothing of this.
 //!
 //! With `--keep` the tiles stay, and `verify` itself must come to the same verdict.
 //!
@@ -35,8 +36,7 @@ use verify::{GrowingProof, Verdict};
 const INTERVAL: Duration = Duration::from_millis(20);
 const BETWEEN_PROOFS: Duration = Duration::from_millis(500);
 
-/// The memory that the job may take, and that a proof takes.
-const MEMORY: &str = "256 MiB";
+/// The memory that a proof takes.
 const PROOF_MEMORY: u64 = 256 << 20;
 
 /// What the user wants.
@@ -45,19 +45,23 @@ struct Arguments {
     copies: Vec<usize>,
     folder: Option<PathBuf>,
     keep: bool,
+    /// The MiB of memory that the job may take.
+    memory: u64,
     /// The bytes of the disk that stay free.
     free: u64,
 }
 
 impl Arguments {
     fn read() -> Outcome<Arguments> {
-        let mut read = Arguments { file: None, copies: Vec::new(), folder: None, keep: false, free: 15 << 30 };
+        let mut read =
+            Arguments { file: None, copies: Vec::new(), folder: None, keep: false, memory: 256, free: 15 << 30 };
         let mut words = std::env::args().skip(1).filter(|word| word != "--bench");
         while let Some(word) = words.next() {
             let mut value = || words.next().ok_or_else(|| format!("{word} needs a value"));
             match word.as_str() {
                 "--keep" => read.keep = true,
                 "--in" => read.folder = Some(value()?.into()),
+                "--memory" => read.memory = value()?.parse()?,
                 "--free" => read.free = value()?.parse::<u64>()? << 30,
                 _ => match word.parse() {
                     Ok(count) => read.copies.push(count),
@@ -87,7 +91,7 @@ fn main() -> Outcome<()> {
         let output = scratch.path().join(format!("{}-copies", targets.len()));
         let urls: Vec<String> = targets.iter().map(|target| format!("{server}{target}")).collect();
         let config = output.with_extension("toml");
-        fs::write(&config, toml_of(&urls, &output))?;
+        fs::write(&config, toml_of(&urls, &output, arguments.memory))?;
         let done = watched_job(&config, &output, scratch.path(), &arguments)?;
         done.print(targets.len())?;
         fs::remove_dir_all(&output)?;
@@ -95,10 +99,10 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// Returns the configuration of a job that reads `urls` and writes to `output`.
-fn toml_of(urls: &[String], output: &Path) -> String {
+/// Returns the configuration of a job that reads `urls` and writes to `output`, in so many MiB of memory.
+fn toml_of(urls: &[String], output: &Path, memory: u64) -> String {
     let tiles = "format = \"3dtiles\"\ncompression = \"none\"\nlevels = false";
-    let limits = format!("memory = {MEMORY:?}\nthreads = 2");
+    let limits = format!("memory = \"{memory} MiB\"\nthreads = 2");
     format!("[input]\nfiles = {urls:?}\n[output]\ndirectory = {output:?}\n{tiles}\n[limits]\n{limits}\n")
 }
 
