@@ -16,6 +16,7 @@
 //! are 2 and 16. Linux only.
 
 mod jobs;
+mod threads;
 
 use cpu_time::{ProcessTime, ThreadTime};
 use job::progress::stage::ProgressOutput;
@@ -23,21 +24,14 @@ use job::report::job_report::Report;
 use jobs::{FULL, Outcome, PLAIN, as_las, default_file, empty, write_config};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use threads::states_of_workers;
 
 /// The time between two looks at the threads.
 const INTERVAL: Duration = Duration::from_millis(3);
-
-/// A worker without work asks the others for some, and leaves its processor to them each time. Where threads are more than processors it is
-/// still waiting for one then, but it does not work. So a worker counts as idle if its turns on a processor are shorter than this.
-const SHORTEST_TURN: Duration = Duration::from_micros(50);
-
-/// One look may come when a turn has only begun, so a worker is idle after so many looks that saw short turns.
-const SHORT_TURNS: u32 = 2;
 
 /// The first argument of the process of one job.
 const ONE_JOB: &str = "one-job";
@@ -182,58 +176,12 @@ fn watch(ended: &AtomicBool) -> Vec<Moment> {
     let (mut moments, mut turns) = (Vec::new(), HashMap::new());
     while !ended.load(Ordering::Relaxed) {
         let cpu = ProcessTime::now().as_duration().as_secs_f64() - ThreadTime::now().as_duration().as_secs_f64();
-        let states = states_of_workers(&mut turns);
+        let states = states_of_workers("self", &mut turns);
         let [running, waiting] = [b'R', b'D'].map(|state| states.iter().filter(|seen| **seen == state).count());
         moments.push(Moment { at: Instant::now(), cpu, running, waiting });
         std::thread::sleep(INTERVAL);
     }
     moments
-}
-
-/// What a thread has had of the processors.
-#[derive(Clone, Copy, Default)]
-struct Turns {
-    nanoseconds: u64,
-    count: u64,
-    /// How many looks in a row have seen short turns.
-    short: u32,
-}
-
-impl Turns {
-    /// Takes what the thread has had by now.
-    fn update(&mut self, nanoseconds: u64, count: u64) {
-        let (more, turns) = (nanoseconds - self.nanoseconds, count - self.count);
-        let is_short = Duration::from_nanos(more / turns.max(1)) < SHORTEST_TURN;
-        if turns > 0 || !is_short {
-            *self = Turns { nanoseconds, count, short: if is_short { self.short + 1 } else { 0 } };
-        }
-    }
-
-    fn is_idle(&self) -> bool {
-        self.short >= SHORT_TURNS
-    }
-}
-
-/// Returns the states of the workers that are not idle.
-fn states_of_workers(turns: &mut HashMap<String, Turns>) -> Vec<u8> {
-    let Ok(threads) = fs::read_dir("/proc/self/task") else { return Vec::new() };
-    let names = threads.flatten().map(|thread| thread.file_name().to_string_lossy().into_owned());
-    names.filter_map(|thread| state(thread, turns)).collect()
-}
-
-/// Returns the state of a thread; `None` if it is no worker, has ended or is idle.
-fn state(thread: String, turns: &mut HashMap<String, Turns>) -> Option<u8> {
-    let folder = format!("/proc/self/task/{thread}");
-    let text = fs::read_to_string(format!("{folder}/stat")).ok()?;
-    let (name, rest) = text.split_once('(')?.1.rsplit_once(") ")?;
-    if !name.starts_with("worker") {
-        return None;
-    }
-    let schedule = fs::read_to_string(format!("{folder}/schedstat")).unwrap_or_default();
-    let mut numbers = schedule.split_whitespace().map(|number| number.parse().unwrap_or(0));
-    let turns = turns.entry(thread).or_default();
-    turns.update(numbers.next().unwrap_or(0), numbers.nth(1).unwrap_or(0));
-    rest.bytes().next().filter(|state| *state != b'R' || !turns.is_idle())
 }
 
 /// The times of a stage.

@@ -1,26 +1,15 @@
 //! What the benchmarks of whole jobs share: the cloud, the kinds of jobs, and their folders.
 
-use std::path::{Path, PathBuf};
+#[path = "../cloud/mod.rs"]
+mod cloud;
 
-pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+pub(crate) use cloud::{Outcome, default_file};
+use std::path::{Path, PathBuf};
 
 /// Plain tiles alone.
 pub(crate) const PLAIN: &str = "compression = \"none\"\nlevels = false";
 /// Everything that viewers use: tiles packed with meshopt, and levels of detail.
 pub(crate) const FULL: &str = "format = \"3dtiles\"";
-
-/// Returns autzen.laz from the test data, or a sample terrain of 4 million points if there is none.
-pub(crate) fn default_file(scratch: &Path) -> Outcome<PathBuf> {
-    let shared = std::env::var_os("GDT_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    let autzen = shared.join("data/autzen.laz");
-    if autzen.is_file() {
-        return Ok(autzen);
-    }
-    let sample = scratch.join("sample.laz");
-    gdt_batch::sample::write(&sample, 4_000_000, 1, true)?;
-    Ok(sample)
-}
 
 /// Writes the same points without compression, and returns the path.
 pub(crate) fn as_las(file: &Path, scratch: &Path) -> Outcome<PathBuf> {

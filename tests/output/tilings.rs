@@ -2,7 +2,7 @@
 
 use tiles::Compression;
 use tiles::frame::Frame;
-use verify::{Verdict, verify};
+use verify::{GrowingProof, Verdict, verify};
 
 use crate::model::{cloud, cut, cut_by_place, grid, lattice, terrain, utm, write_tiles, write_tiles_as};
 use crate::random::Random;
@@ -30,6 +30,30 @@ fn every_tiling_has_the_same_verdict_except_for_the_borders() {
         assert!(borders.contains(&verdict.edges_across_tiles), "{verdict}");
         let same = Verdict { tiles: 1, edges_across_tiles: 0, ..verdict };
         assert_eq!(same, whole);
+    }
+}
+
+#[test]
+fn tiles_that_go_as_soon_as_they_are_checked_have_the_same_verdict() {
+    let frame = utm();
+    let directory = tempfile::tempdir().unwrap();
+    let mut tiles = cut_by_place(&terrain(&frame, &cloud(7, 2_000, 100_000)), 4);
+    for is_broken in [false, true] {
+        if is_broken {
+            let [a, b, c] = tiles[2].triangles[5];
+            tiles[2].triangles[5] = [a, c, b];
+        }
+        write_tiles(directory.path(), &frame, &tiles);
+        let expected = verify(directory.path(), MEMORY).unwrap();
+        assert_eq!(expected.failures.is_empty(), !is_broken, "{expected}");
+        let names: Vec<String> = (0..tiles.len()).map(|number| format!("tiles/{number:05}.glb")).collect();
+        let path = |name: &str| directory.path().join(name);
+        let proof = GrowingProof::begin(&path(&names[0]), directory.path(), MEMORY).unwrap();
+        for name in &names {
+            proof.check(&path(name), name).unwrap();
+            std::fs::write(path(name), "").unwrap();
+        }
+        assert_eq!(proof.conclude(directory.path()).unwrap(), expected);
     }
 }
 

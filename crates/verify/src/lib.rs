@@ -37,6 +37,8 @@
 //!
 //! Together with the number of sites in the report this proves that no site that the job has read is missing.
 //!
+//! All of this needs each tile once. [`GrowingProof`] takes them as a job writes them, and comes to the same verdict when they are gone.
+//!
 //! # Triangles that are left out
 //!
 //! The triangles that `[output] hull`, `max_edge` and `[input] clip` leave out of the terrain are in `cut/`. All checks are made on the triangles in `tiles/`
@@ -84,6 +86,7 @@ mod exact;
 mod failures;
 mod file_search;
 mod findings;
+mod growing_proof;
 mod half_edges;
 mod hull;
 mod inputs;
@@ -97,6 +100,7 @@ mod verdict;
 mod watcher;
 mod written_files;
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -104,6 +108,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 pub use digest::{Digest, digest_of};
+pub use growing_proof::GrowingProof;
 pub use terrain::{Error, Result, SourceGrid, SourceGridError};
 pub use verdict::{Conclusion, Verdict};
 pub use watcher::Watcher;
@@ -154,7 +159,7 @@ pub fn verify_watched(directory: &Path, memory: u64, inputs: &[PathBuf], watcher
         return Err(error.into());
     }
     let report = ReadReport::read(directory);
-    let written = WrittenFiles::check(directory, report.facts.file_list, watcher);
+    let written = WrittenFiles::check(directory, report.facts.file_list, &HashMap::new(), watcher);
     let unusable = |what: String| Ok(Verdict::without_mesh(what, &report, &written));
     let files = match found {
         Ok(files) => files,

@@ -50,6 +50,19 @@ impl TileFiles {
         Ok(TileFiles { paths, terrain, extras, largest })
     }
 
+    /// Returns the files of a terrain whose `tiles` have been read already and need not be there any more, and those of `cut/` in the output
+    /// `directory` of its job.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if `cut/` cannot be listed.
+    pub(super) fn with_cut(tiles: Vec<PathBuf>, extras: Extras, directory: &Path) -> Result<TileFiles> {
+        let (terrain, mut paths, cut) = (tiles.len(), tiles, OutputFiles::new(directory).cut());
+        if cut.is_dir() {
+            paths.extend(glb_files(&cut)?);
+        }
+        Ok(TileFiles { paths, terrain, extras, largest: 0 })
+    }
+
     /// Returns the name of a file for people.
     pub(super) fn name(&self, number: u32) -> String {
         let number = number as usize;

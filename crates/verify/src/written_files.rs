@@ -1,6 +1,6 @@
 //! Compares every result with the checksum that the job has left of it.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::{Component, Path};
 
@@ -36,8 +36,14 @@ enum State {
 }
 
 impl WrittenFiles {
-    /// Compares the files in the output `directory` of a job with its list. `expected` is the checksum of the list, if the report says it.
-    pub(super) fn check(directory: &Path, expected: Option<Checksum>, watcher: &dyn Watcher) -> WrittenFiles {
+    /// Compares the files in the output `directory` of a job with its list. `expected` is the checksum of the list, if the report says it;
+    /// `seen` has the checksums of files that are not read, by their names in the list.
+    pub(super) fn check(
+        directory: &Path,
+        expected: Option<Checksum>,
+        seen: &HashMap<String, Checksum>,
+        watcher: &dyn Watcher,
+    ) -> WrittenFiles {
         let output = OutputFiles::new(directory);
         let path = output.checksums();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -52,7 +58,7 @@ impl WrittenFiles {
         let files = parse_list(&text).filter(|files| files.iter().all(|(name, _)| is_inside(name)));
         match files {
             Some(files) if expected.is_none_or(|expected| expected == Checksum::of(&text)) => {
-                compare(&output, &files, watcher)
+                compare(&output, &files, seen, watcher)
             }
             _ => WrittenFiles::failed(format!(
                 "{name}: it is not as the job wrote it, so that no file can be compared with it"
@@ -70,10 +76,15 @@ fn is_inside(name: &str) -> bool {
     Path::new(name).components().all(|part| matches!(part, Component::Normal(_)))
 }
 
-fn compare(output: &OutputFiles, files: &[(String, Checksum)], watcher: &dyn Watcher) -> WrittenFiles {
+fn compare(
+    output: &OutputFiles,
+    files: &[(String, Checksum)],
+    seen: &HashMap<String, Checksum>,
+    watcher: &dyn Watcher,
+) -> WrittenFiles {
     watcher.begin("checksums", files.len() as u64, "files");
     let state = |(name, wanted): &(String, Checksum)| {
-        let found = state(output, name, *wanted);
+        let found = state(output, name, seen.get(name).copied(), *wanted);
         watcher.advance(1);
         found
     };
@@ -103,10 +114,11 @@ fn compare(output: &OutputFiles, files: &[(String, Checksum)], watcher: &dyn Wat
     checked
 }
 
-fn state(output: &OutputFiles, name: &str, wanted: Checksum) -> State {
-    match Checksum::of_file(&output.directory().join(name)) {
-        Ok((_, found)) if found == wanted => State::Unchanged,
-        Ok((_, found)) => State::Changed(format!("its checksum is {found}, not {wanted}")),
+fn state(output: &OutputFiles, name: &str, seen: Option<Checksum>, wanted: Checksum) -> State {
+    let read = || Checksum::of_file(&output.directory().join(name)).map(|(_, found)| found);
+    match seen.map_or_else(read, Ok) {
+        Ok(found) if found == wanted => State::Unchanged,
+        Ok(found) => State::Changed(format!("its checksum is {found}, not {wanted}")),
         Err(error) if error.kind() == ErrorKind::NotFound => State::Gone,
         Err(error) => State::Changed(format!("it cannot be read: {error}")),
     }

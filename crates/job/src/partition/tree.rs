@@ -102,9 +102,10 @@ pub struct Tree {
     pub leaves: Vec<NodeIndex>,
 }
 
-/// Frontiers are merged at the root, at its grandchildren and at every third inner node below those, eight at a time where the
+/// In a part, frontiers are merged at the root, at its grandchildren and at every third inner node below those, eight at a time where the
 /// tree is full. Merging two at every node would triangulate most frontier sites more than twice as often. The root merges only
-/// four, because other threads have little to do meanwhile.
+/// four, because other threads have little to do meanwhile. Above the parts two are merged at every node: frontiers grow with the job
+/// there, so the largest merge decides how much memory it needs.
 const MERGE_STRIDE: usize = 3;
 
 impl Tree {
@@ -133,7 +134,13 @@ impl Tree {
     pub fn is_merge(&self, node: NodeIndex) -> bool {
         let is_inner = matches!(self.node(node).kind, NodeKind::Inner(_));
         let depth = self.ancestors(node).count();
-        is_inner && (depth == 0 || (depth + 1).is_multiple_of(MERGE_STRIDE))
+        is_inner && (depth == 0 || self.is_above_parts() || (depth + 1).is_multiple_of(MERGE_STRIDE))
+    }
+
+    /// Tells whether the leaves are the parts of a job, not the tiles of one.
+    fn is_above_parts(&self) -> bool {
+        let first = self.leaves.first().map(|&leaf| &self.node(leaf).kind);
+        matches!(first, Some(NodeKind::Leaf(tile)) if tile.part() != self.part)
     }
 
     /// Returns the merge nodes above `node`, nearest first.
@@ -180,7 +187,10 @@ mod tests {
         };
         let tree = Tree { nodes: (0..12).map(inner).collect(), ..Tree::default() };
         let merges: Vec<usize> = (0..12).filter(|&node| tree.is_merge(NodeIndex::new(node))).collect();
-        assert_eq!((LAYOUT, merges), (35, vec![0, 2, 5, 8, 11]));
+        assert_eq!((LAYOUT, merges), (36, vec![0, 2, 5, 8, 11]));
+        let mut above = Tree { part: PartIndex::new(1), leaves: vec![NodeIndex::new(12)], ..tree };
+        above.nodes.push(TreeNode { kind: NodeKind::Leaf(PartIndex::FIRST.tile(0)), ..inner(12) });
+        assert!((0..12).all(|node| above.is_merge(NodeIndex::new(node))));
     }
 
     proptest! {

@@ -87,7 +87,8 @@ pub(crate) fn merge_through(job: &Job, stores: &PartStores, last: PartIndex) -> 
     }
     let directory = &job.directory.join();
     let folder = Folder::open(job, directory, job.above())?;
-    let merges = complete.into_iter().map(|node| merge_at(job, stores, &folder, node));
+    // Nothing else goes on meanwhile.
+    let merges = complete.into_iter().map(|node| merge_at(job, stores, &folder, node, 1));
     Ok(merges.collect::<crate::Result<Vec<_>>>()?.concat())
 }
 
@@ -114,11 +115,18 @@ fn merge_below(job: &Job, stores: &PartStores, folder: &Folder, node: NodeIndex)
     if !tree.is_merge(node) {
         return Ok(());
     }
-    merge_at(job, stores, folder, node).map(|_| ())
+    merge_at(job, stores, folder, node, job.threads).map(|_| ())
 }
 
-/// Merges at `node`, unless that is done. Returns the tiles that this finishes.
-fn merge_at(job: &Job, stores: &PartStores, folder: &Folder, node: NodeIndex) -> crate::Result<Vec<TileIndex>> {
+/// Merges at `node`, unless that is done, in the share of the memory that one of `threads` threads has. Returns the tiles that this
+/// finishes.
+fn merge_at(
+    job: &Job,
+    stores: &PartStores,
+    folder: &Folder,
+    node: NodeIndex,
+    threads: usize,
+) -> crate::Result<Vec<TileIndex>> {
     if let Some(finished) = folder.done(JobStep::Merge(node))? {
         return Ok(finished);
     }
@@ -134,7 +142,7 @@ fn merge_at(job: &Job, stores: &PartStores, folder: &Folder, node: NodeIndex) ->
         .zip(&opened)
         .map(|(&child, part)| part.as_ref().map_or((&folder.store, child), |part| (&part.store, NodeIndex::ROOT)))
         .collect();
-    let memory = merge_memory(&job.plan.options, node == NodeIndex::ROOT, job.threads);
+    let memory = merge_memory(&job.plan.options, node == NodeIndex::ROOT, threads);
     let finished = merge_frontiers(job.plan, tree.node(node).cell, &sources, &folder.store, memory, node)?;
     Ok(folder.record(JobStep::Merge(node), finished, Vec::new())?)
 }
