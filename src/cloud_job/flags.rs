@@ -17,7 +17,7 @@ pub(crate) struct Flag {
 }
 
 /// The flags that are lines of a configuration and no paths.
-const FLAGS: [Flag; 13] = [
+const FLAGS: [Flag; 14] = [
     Flag { name: "surface", table: "input", key: "surface", value: |given| text(&given.surface) },
     Flag {
         name: "bounds",
@@ -28,6 +28,7 @@ const FLAGS: [Flag; 13] = [
     Flag { name: "crs", table: "input", key: "crs", value: |given| text(&given.crs) },
     Flag { name: "to-crs", table: "input", key: "to_crs", value: |given| text(&given.to_crs) },
     Flag { name: "unit", table: "input", key: "unit", value: |given| text(&given.unit) },
+    Flag { name: "height-unit", table: "input", key: "height_unit", value: |given| text(&given.height_unit) },
     Flag { name: "on-bad-file", table: "input", key: "on_bad_file", value: |given| text(&given.on_bad_file) },
     Flag { name: "max-error", table: "output", key: "max_error", value: |given| given.max_error.map(Value::Float) },
     Flag {

@@ -47,6 +47,9 @@ pub struct CloudOptions {
     /// The unit of x and y, if the files name none.
     #[arg(long, value_name = "UNIT", value_parser = choice("[input]", "unit"))]
     pub unit: Option<String>,
+    /// The unit of z, if the files name none. Default: that of x and y.
+    #[arg(long, value_name = "UNIT", value_parser = choice("[input]", "height_unit"))]
+    pub height_unit: Option<String>,
     /// Colours of the vertices: an orthophoto (GeoTIFF, also by URL), or rgb, elevation, class or none.
     #[arg(long, value_name = "COLOR", value_parser = color)]
     pub color: Option<String>,

@@ -107,9 +107,10 @@ fn unit(draft: &Draft, sources: &[&Source], plan: &Plan, is_unknown: bool) -> St
     }
 }
 
-/// Returns the unit of z, if a file says it. Points that are transformed get one in any case.
+/// Returns the unit of z, if a file or the configuration states it. Points that are transformed get one in any case.
 pub(crate) fn unit_of_heights(plan: &Plan) -> Option<Unit> {
-    let is_said = plan.inputs.iter().any(|input| input.source.own_crs().vertical.is_some());
+    let is_chosen = plan.options.input.height_unit.metres().is_some();
+    let is_said = is_chosen || plan.inputs.iter().any(|input| input.source.own_crs().vertical.is_some());
     plan.crs.vertical.filter(|_| is_said).map(|metres| Unit::from_metres(Some(metres)))
 }
 

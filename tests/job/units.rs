@@ -248,3 +248,31 @@ fn the_unit_of_a_record_without_a_system_is_that_of_the_plane_unless_the_user_st
     assert_eq!(found[0], 0.3048);
     assert!(said.contains("x and y are treated as a plane in foot"), "{said}");
 }
+
+/// `height_unit` states what files do not. What a file or a CRS states instead is no unit that it overrides in silence.
+#[test]
+fn the_user_states_the_unit_of_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    let [silent, feet] =
+        [("none.csv", "x,y,z"), ("ft.csv", "x [m],y [m],z [ft]")].map(|(name, header)| csv(&folder, name, header));
+    let crs = "crs = \"EPSG:32633\"";
+    let (found, said) = metres(&[&silent], crs);
+    assert_eq!(found, [1.0; 2]);
+    assert!(said.contains("heights are taken to be in the unit of x and y (metre)"), "{said}");
+    let chosen = format!("{crs}\nheight_unit = \"foot\"");
+    let (found, said) = metres(&[&silent], &chosen);
+    assert_eq!(found, [1.0, 0.3048]);
+    assert!(!said.contains("has no unit of heights") && !said.contains("taken to be in the unit"), "{said}");
+    assert_eq!(metres(&[&silent], "height_unit = \"foot\"").0, [1.0, 0.3048]);
+    assert_eq!(metres(&[&silent], "unit = \"foot\"\nheight_unit = \"metre\"").0, [0.3048, 1.0]);
+    // A CRS of the user overrides those of files, and so does the unit beside it.
+    assert_eq!(metres(&[&feet], &format!("{crs}\nheight_unit = \"us-foot\"")).0, [1.0, US_FOOT]);
+    let transformed = Job::on(&[&silent]).with("input", &format!("{chosen}\nto_crs = \"EPSG:32634\""));
+    transformed.verified();
+    let place: Value = serde_json::from_slice(&fs::read(transformed.out().join("georeference.json")).unwrap()).unwrap();
+    let highest = place["bounds"][1][2].as_f64().unwrap();
+    assert!((highest - 2.75 * 0.3048).abs() < 0.006, "{place}");
+    for input in ["height_unit = \"metre\"", "crs = \"EPSG:32633+5773\"\nheight_unit = \"foot\""] {
+        Job::on(&[&feet]).with("input", input).run().refused(2, &["[input] height_unit is ", "leave height_unit out"]);
+    }
+}

@@ -79,6 +79,9 @@ pub struct InputOptions {
     /// The unit of x and y.
     #[serde(default)]
     pub unit: UnitChoice,
+    /// The unit of z.
+    #[serde(default, skip_serializing_if = "UnitChoice::is_auto")]
+    pub height_unit: UnitChoice,
     /// The step of the lattice in x and y.
     #[serde(default)]
     pub resolution: ResolutionChoice,
@@ -261,7 +264,7 @@ impl OutsideCrsArea {
     }
 }
 
-/// A unit that the user chooses: of x and y of points, or of the heights of lines.
+/// A unit that the user chooses: of x and y of points, or of heights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum UnitChoice {
@@ -277,6 +280,10 @@ pub enum UnitChoice {
 }
 
 impl UnitChoice {
+    fn is_auto(&self) -> bool {
+        *self == UnitChoice::Auto
+    }
+
     /// Returns the unit that is chosen, or [`Unit::Unknown`].
     pub fn unit(self) -> Unit {
         match self {

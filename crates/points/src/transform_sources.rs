@@ -21,7 +21,7 @@ use sys::{Error, Result, Warnings};
 /// The name of heights that count from the ellipsoid because their system of places has three axes.
 const ELLIPSOIDAL: &str = "ellipsoidal height";
 
-/// Gives files that name no CRS the one of `[input] missing_crs`. With `[input] to_crs`, has the points of all sources transformed
+/// Gives files that name no CRS the one of `[input] missing_crs`, and those that state no unit of heights the one of `[input] height_unit`. With `[input] to_crs`, has the points of all sources transformed
 /// into that: the sources then look like files in that system. Those that are in it already keep their coordinates.
 ///
 /// The outcome depends on the set of the sources and the options alone, so whoever does it again finds the same points.
@@ -30,6 +30,7 @@ const ELLIPSOIDAL: &str = "ellipsoidal height";
 /// [`Error::Config`] if a source does not say what it is in, or there is no way to the system.
 pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warnings: &mut Warnings) -> Result<()> {
     sources.iter_mut().for_each(Source::forget_transform);
+    take_height_unit(sources, options)?;
     if options.missing_crs.is_some() && options.crs != CrsChoice::Auto {
         return Err(Error::Config(
             "[input] missing_crs is for files that name no CRS, and crs sets that of all files: leave one of them out"
@@ -61,6 +62,38 @@ pub fn transform_sources(sources: &mut [Source], options: &InputOptions, warning
     let notes = notes.collect::<Result<Vec<DatumNote>>>()?;
     warn_of_datums(sources, &notes, warnings);
     warn_of_scale(sources, &to, warnings);
+    Ok(())
+}
+
+/// Takes the unit of heights that the user states. A CRS that the user states overrides those of the files, and so does this unit then.
+///
+/// # Errors
+/// [`Error::Config`] if the CRS, or the columns of a text, have heights in another unit.
+fn take_height_unit(sources: &mut [Source], options: &InputOptions) -> Result<()> {
+    let Some(chosen) = options.height_unit.metres() else { return Ok(()) };
+    let refuse = |subject: String, own: f64| match same_length(own, chosen) {
+        true => Ok(()),
+        false => Err(Error::Config(format!(
+            "{subject} has heights in {}, but [input] height_unit is {}: leave height_unit out if the CRS is right; otherwise set [input] crs to \
+             a CRS without heights",
+            Unit::from_metres(Some(own)).name(),
+            options.height_unit.unit().name()
+        ))),
+    };
+    let overrides = match &options.crs {
+        CrsChoice::Given { crs, .. } => {
+            crs.vertical.map_or(Ok(()), |own| refuse(format!("[input] crs ({})", crs.label()), own))?;
+            true
+        }
+        CrsChoice::None => true,
+        CrsChoice::First | CrsChoice::Auto => false,
+    };
+    for source in sources {
+        match source.crs.vertical {
+            Some(own) if !overrides => refuse(source.path.display().to_string(), own)?,
+            _ => source.crs.vertical = Some(chosen),
+        }
+    }
     Ok(())
 }
 

@@ -159,8 +159,8 @@ fn try_plan(
     refuse_missing_classes(sources, &options.input)?;
     refuse_missing_returns(sources, &options.input)?;
     let (choice, unit_choice) = said_of_sources(options);
-    let crs = common_crs(sources, choice, unit_choice, &mut warnings)?;
-    let (unit, metres) = horizontal_unit(sources, unit_choice, choice, &crs, &mut warnings)?;
+    let crs = common_crs(sources, &choice, unit_choice, &mut warnings)?;
+    let (unit, metres) = horizontal_unit(sources, unit_choice, &choice, &crs, &mut warnings)?;
     let metres_z = crs.vertical.unwrap_or(metres);
     warn_of_geocentric(sources, &options.input, &mut warnings);
     warn_of_degrees(sources, &options.input, &mut warnings);
@@ -193,9 +193,7 @@ fn try_plan(
     if metres_z != metres {
         let other = match unit_choice {
             UnitChoice::Auto => "",
-            _ => {
-                "; fix: a CRS with a vertical part if the unit of heights is wrong: [input] unit sets that of x and y alone"
-            }
+            _ => "; fix: [input] height_unit, if the unit of heights is wrong: [input] unit sets that of x and y alone",
         };
         warnings.push(format!(
             "heights are in another unit than x and y ({metres_z} m and {metres} m): the tiles have all in metres{other}"
@@ -309,10 +307,14 @@ fn refuse_contradicting_options(options: &JobOptions) -> Result<()> {
 }
 
 /// Returns what the user says of the coordinates of the sources. Of those that are transformed, the target says all.
-fn said_of_sources(options: &JobOptions) -> (&CrsChoice, UnitChoice) {
+fn said_of_sources(options: &JobOptions) -> (CrsChoice, UnitChoice) {
+    let mut choice = options.input.crs.clone();
+    if let CrsChoice::Given { crs, .. } = &mut choice {
+        crs.vertical = crs.vertical.or(options.input.height_unit.metres());
+    }
     match options.input.to_crs {
-        Some(_) => (&CrsChoice::Auto, UnitChoice::Auto),
-        None => (&options.input.crs, options.input.unit),
+        Some(_) => (CrsChoice::Auto, UnitChoice::Auto),
+        None => (choice, options.input.unit),
     }
 }
 

@@ -150,8 +150,12 @@ pub(crate) fn heights_warning(crs: &Crs, offset: Option<&HeightOffset>) -> Optio
         ),
         None => "vertical datum unknown: heights may be above sea level".to_string(),
     };
+    let unit = match crs.vertical {
+        None => "; and [input] height_unit, if their unit is another one",
+        Some(_) => "",
+    };
     Some(format!(
         "{from}, not the ellipsoid, so the terrain may be tens of metres too low or high on the globe; fix: [output] height_offset = \
-         \"egm96\" or a geoid grid; 0.0 if they are above the ellipsoid"
+         \"egm96\" or a geoid grid; 0.0 if they are above the ellipsoid{unit}"
     ))
 }
