@@ -32,7 +32,7 @@ fn a_unit_key_wins_over_the_code() {
     assert_eq!(crs.wkt, None);
     let told =
         |unit: u16| problems(&records(&[[1024, 0, 1, 1], [3072, 0, 1, 32104], [3076, 0, 1, unit]], &[])).concat();
-    assert!(told(9003).contains("says US survey foot, and EPSG:32104 has them in metre"), "{}", told(9003));
+    assert!(told(9003).contains("is US survey foot, but EPSG:32104 has metre"), "{}", told(9003));
     assert_eq!(told(9001), "");
 }
 
