@@ -190,7 +190,7 @@ fn try_plan(
         let row = farthest_row(sources, options, &extent)?;
         warnings.extend(row.or_else(|| farthest_file(sources, &extent)));
     }
-    if metres_z != metres {
+    if metres_z != metres && options.input.height_unit == UnitChoice::Auto {
         let other = match unit_choice {
             UnitChoice::Auto => "",
             _ => "; fix: [input] height_unit, if the unit of heights is wrong: [input] unit sets that of x and y alone",
