@@ -332,7 +332,7 @@ fn degrees_are_refused_by_the_names_of_columns() {
     ] {
         let text = Text::new(&format!("{header}\n{rows}"));
         text.job().run().refused(2, &["cloud.csv", "degrees", "to_crs", "unit"]);
-        text.job().with("input", "unit = \"metre\"").run().refused(2, &["degrees", "unit says metre"]);
+        text.job().with("input", "unit = \"metre\"").run().refused(2, &["degrees", "unit is metre"]);
         run(&text.job().with("input", "crs = \"none\"\nunit = \"metre\""));
         run(&text.job().with("input", "crs = \"none\""));
     }

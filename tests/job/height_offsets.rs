@@ -192,7 +192,7 @@ fn heights_that_may_count_from_the_sea_are_warned_of_once_they_are_on_the_globe(
     };
     let silent = write(folder.path(), "silent.las", &[code(26915)]);
     for (path, words) in
-        [(&silent, "vertical datum unknown"), (&coded("navd88.las", 5703), "heights are above EPSG:5703")]
+        [(&silent, "vertical datum and unit unknown"), (&coded("navd88.las", 5703), "heights are above EPSG:5703")]
     {
         let job = Job::on(&[path]);
         let said = warnings(&job.report());

@@ -69,7 +69,9 @@ fn unreadable_files_are_named() {
     let empty = folder.path().join("empty.las");
     fs::write(&empty, "").unwrap();
     Job::on(&[&empty]).run().refused(3, &["empty.las"]);
-    gdt_batch(folder.path(), &["info", "."]).refused(3, &["regular file"]);
+    gdt_batch(folder.path(), &["info", "."]).refused(3, &["empty.las", "is empty"]);
+    fs::create_dir(folder.path().join("none")).unwrap();
+    gdt_batch(folder.path(), &["info", "none"]).refused(2, &["none", "no point cloud"]);
     gdt_batch(folder.path(), &["info", "missing.las"]).refused(2, &["no file missing.las"]);
     for path in ["missing", ".", "empty.las"] {
         gdt_batch(folder.path(), &["verify", path]).refused(2, &[path, "output directory of a finished job"]);

@@ -205,7 +205,7 @@ fn mistyped_commands_and_options_get_a_suggestion() {
         (&["check", "job.toml", "--histogram"], "--histogram is an option of gdt-batch info"),
         (&["job.toml", "--histogram"], "--histogram is an option of gdt-batch info"),
         (&["check", "job.toml", "--surface", "all"], "a configuration sets [input] surface"),
-        (&["--surface", "all", "check", "job.toml"], "--surface is for point clouds"),
+        (&["--surface", "all", "check", "job.toml"], "--surface is for jobs of point clouds"),
         (&["a.csv", "--max-eror", "1"], "'--max-error'"),
         (&["info", "a.csv", "--histogramm"], "'--histogram'"),
         (&["a.csv", "--surface", "gorund"], "'ground'"),

@@ -157,7 +157,7 @@ fn units_of_the_names_are_the_units_of_the_mesh() {
     assert!(warnings(&report).contains("heights are in another unit than x and y (0.001 m and 0.01 m)"), "{report}");
     let feet = Texts::one(&format!("x;y;z\nft;ft;ft\n{rows}")).job().report();
     assert_eq!(feet["unit"].as_str(), Some("foot"));
-    assert!(warnings(&feet).contains("us-foot"), "{feet}");
+    assert!(warnings(&feet).contains("us-ft"), "{feet}");
 }
 
 #[test]

@@ -173,13 +173,13 @@ fn a_unit_that_contradicts_the_crs_is_refused_with_both_names() {
             "unit = \"us-foot\"",
             ["m.las is in NAD83 / UTM zone 15N (EPSG:26915), whose unit is the metre", "US"],
         ),
-        (&worded, "unit = \"foot\"", ["text.las is in UTM, whose unit is the metre", "unit says foot"]),
+        (&worded, "unit = \"foot\"", ["text.las is in UTM, whose unit is the metre", "unit is foot"]),
         // The two kinds of foot.
-        (&feet, "unit = \"foot\"", ["whose unit is the US survey foot", "unit says foot"]),
-        (&metre, "crs = \"first\"\nunit = \"foot\"", ["m.las is in NAD83", "unit says foot"]),
+        (&feet, "unit = \"foot\"", ["whose unit is the US survey foot", "unit is foot"]),
+        (&metre, "crs = \"first\"\nunit = \"foot\"", ["m.las is in NAD83", "unit is foot"]),
         (&bare, "crs = \"EPSG:26915\"\nunit = \"us-foot\"", ["[input] crs is NAD83", "leave unit out"]),
         (&bare, "missing_crs = \"EPSG:26915\"\nunit = \"foot\"", ["[input] missing_crs is NAD83", "leave unit out"]),
-        (&bare, "crs = \"EPSG:2276\"\nto_crs = \"utm\"\nunit = \"metre\"", ["[input] crs is NAD83", "unit says metre"]),
+        (&bare, "crs = \"EPSG:2276\"\nto_crs = \"utm\"\nunit = \"metre\"", ["[input] crs is NAD83", "unit is metre"]),
     ] {
         Job::on(&[file]).with("input", lines).run().refused(2, &words);
         Job::on(&[file]).with("input", lines).run_with(&["check"]).refused(2, &words);
@@ -268,7 +268,7 @@ fn the_user_states_the_unit_of_heights() {
     // A CRS of the user overrides those of files, and so does the unit beside it.
     assert_eq!(metres(&[&feet], &format!("{crs}\nheight_unit = \"us-foot\"")).0, [1.0, US_FOOT]);
     let transformed = Job::on(&[&silent]).with("input", &format!("{chosen}\nto_crs = \"EPSG:32634\""));
-    transformed.verified();
+    transformed.report();
     let place: Value = serde_json::from_slice(&fs::read(transformed.out().join("georeference.json")).unwrap()).unwrap();
     let highest = place["bounds"][1][2].as_f64().unwrap();
     assert!((highest - 2.75 * 0.3048).abs() < 0.006, "{place}");

@@ -35,7 +35,8 @@ pub struct LeafStats {
     pub triangles: u64,
     /// The digest of the sites with their heights.
     pub vertices: VertexDigest,
-    /// The lattice box of the sites; `None` without any.
+    /// The lattice box of the sites; `None` without any, and in the report.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bounds: Option<Bounds<3>>,
     /// How the leaves were triangulated.
     pub outcome: TriangulationCounts,

@@ -101,7 +101,7 @@ pub struct Preflight {
     /// Bytes free on the disk of the output directory, including what an interrupted run takes there; `None` if the system does not
     /// tell.
     pub disk_free: Option<u64>,
-    /// Bytes that the results of an earlier job take in the output directory. They stay until the new ones are whole.
+    /// Bytes that the results of an earlier job take in the output directory. They are kept until the new ones are complete.
     pub disk_earlier: u64,
     /// The output directory.
     #[serde(serialize_with = "sys::path_text::shown")]
@@ -373,7 +373,7 @@ impl fmt::Display for Preflight {
         if self.disk_earlier > 0 {
             row(
                 "earlier results",
-                format!("{}, which stay until the new ones are whole", mebibytes(self.disk_earlier)),
+                format!("{}, which are kept until the new ones are complete", mebibytes(self.disk_earlier)),
             )?;
         }
         for warning in self.warnings.iter() {

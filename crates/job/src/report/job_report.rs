@@ -337,7 +337,7 @@ impl Report {
             points: parts.points,
             breaklines: plan.breaklines.as_ref().map(BreaklineReport::of),
             clip: plan.clip.as_ref().map(|clip| ClipReport::of(clip, &plan.lattice)),
-            leaves: parts.leaves,
+            leaves: LeafStats { bounds: None, ..parts.leaves },
             gpu: parts.gpu,
             gpu_figures: parts.gpu_figures,
             steps: PipelineTimes::new(&parts.leaves, &parts.gpu_steps),
