@@ -16,8 +16,6 @@ use std::time::Instant;
 
 /// The greatest coordinate of uniform sites.
 const SIDE: f64 = 1e8;
-/// Levels of the tree between two merges below the root, as in `job/partition/tree.rs`.
-const MERGE_STRIDE: u32 = 3;
 /// The points of a part unless there would be more than [`MOST_PARTS`].
 const POINTS_PER_PART: f64 = 2e7;
 const MOST_PARTS: f64 = 1000.0;
@@ -102,7 +100,7 @@ fn simulate(points: f64, law: f64, nanoseconds: f64) {
     let total: f64 = densities.iter().sum();
     let along = densities.iter().map(|density| (points * density / total).sqrt()).collect();
     let mut simulation = Simulation { size, along, law, joined: 0.0, largest: 0.0 };
-    simulation.merge([0, 0], size, 0);
+    simulation.merge([0, 0], size);
     let (joined, largest) = (simulation.joined, simulation.largest);
     println!(
         "{points:11.0e} {parts:7} {:12.1e} {joined:14.2e} {:8.2} GB {:9.1} {largest:15.2e} {:7.2} GB {:8.1}",
@@ -115,9 +113,8 @@ fn simulate(points: f64, law: f64, nanoseconds: f64) {
 }
 
 impl Simulation {
-    /// Merges the block of parts that begins at `from`, which lies `depth` levels below the root. Returns the sites of the frontiers that the
-    /// next merge above it gets.
-    fn merge(&mut self, from: [usize; 2], size: [usize; 2], depth: u32) -> f64 {
+    /// Merges the block of parts that begins at `from`, two blocks at every node. Returns the sites of its frontier.
+    fn merge(&mut self, from: [usize; 2], size: [usize; 2]) -> f64 {
         if size == [1, 1] {
             return self.frontier(from, size);
         }
@@ -125,10 +122,7 @@ impl Simulation {
         let (mut half, mut second) = (size, from);
         half[axis] /= 2;
         second[axis] += half[axis];
-        let below = self.merge(from, half, depth + 1) + self.merge(second, half, depth + 1);
-        if depth != 0 && !(depth + 1).is_multiple_of(MERGE_STRIDE) {
-            return below;
-        }
+        let below = self.merge(from, half) + self.merge(second, half);
         self.joined += below;
         self.largest = self.largest.max(below);
         self.frontier(from, size)

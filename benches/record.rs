@@ -1,5 +1,5 @@
-//! How large a job can this machine do? `cargo bench --bench record [-- [FILE.laz] [COPIES...] [--keep] [--in FOLDER] [--memory MIB]
-//! [--free GIB]]`.
+//! How large a job can this machine do? `cargo bench --bench record [-- [FILE.laz] [COPIES...] [--keep] [--flat] [--in FOLDER]
+//! [--memory MIB] [--free GIB]]`.
 //!
 //! The cloud of a job is one file many times, side by side, which a server in this process hands out (`copies`). So the points take no disk,
 //! and the temporary files of the job alone bound its size. For each number of COPIES the program runs once, with two threads, a memory of
@@ -7,7 +7,9 @@
 //! the results take no disk either. The verdict is that of `gdt-batch verify`: each tile is read once, and the borders of all are
 //! matched when the job is done ([`verify::GrowingProof`]). The program knows nothing of this.
 //!
-//! With `--keep` the tiles stay, and `verify` itself must come to the same verdict.
+//! With `--keep` the tiles stay, and `verify` itself must come to the same verdict. Scenes of 3D Tiles wider than 7 km follow the earth,
+//! which takes more time a point than smaller ones do; with `--flat` all are flat (`format = "glb"`, for clouds too large for one file: from
+//! 100 million points on).
 //!
 //! This prints for each job: the points, the processor time and memory, the stages, the share of the time in which at most one thread
 //! runs (as in the benchmark `serial`: threads that wait for a processor or the disk run), and the verdict. The job is stopped if less than
@@ -45,6 +47,7 @@ struct Arguments {
     copies: Vec<usize>,
     folder: Option<PathBuf>,
     keep: bool,
+    flat: bool,
     /// The MiB of memory that the job may take.
     memory: u64,
     /// The bytes of the disk that stay free.
@@ -53,13 +56,21 @@ struct Arguments {
 
 impl Arguments {
     fn read() -> Outcome<Arguments> {
-        let mut read =
-            Arguments { file: None, copies: Vec::new(), folder: None, keep: false, memory: 256, free: 15 << 30 };
+        let mut read = Arguments {
+            file: None,
+            copies: Vec::new(),
+            folder: None,
+            keep: false,
+            flat: false,
+            memory: 256,
+            free: 15 << 30,
+        };
         let mut words = std::env::args().skip(1).filter(|word| word != "--bench");
         while let Some(word) = words.next() {
             let mut value = || words.next().ok_or_else(|| format!("{word} needs a value"));
             match word.as_str() {
                 "--keep" => read.keep = true,
+                "--flat" => read.flat = true,
                 "--in" => read.folder = Some(value()?.into()),
                 "--memory" => read.memory = value()?.parse()?,
                 "--free" => read.free = value()?.parse::<u64>()? << 30,
@@ -91,7 +102,7 @@ fn main() -> Outcome<()> {
         let output = scratch.path().join(format!("{}-copies", targets.len()));
         let urls: Vec<String> = targets.iter().map(|target| format!("{server}{target}")).collect();
         let config = output.with_extension("toml");
-        fs::write(&config, toml_of(&urls, &output, arguments.memory))?;
+        fs::write(&config, toml_of(&urls, &output, &arguments))?;
         let done = watched_job(&config, &output, scratch.path(), &arguments)?;
         done.print(targets.len())?;
         fs::remove_dir_all(&output)?;
@@ -99,10 +110,11 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// Returns the configuration of a job that reads `urls` and writes to `output`, in so many MiB of memory.
-fn toml_of(urls: &[String], output: &Path, memory: u64) -> String {
-    let tiles = "format = \"3dtiles\"\ncompression = \"none\"\nlevels = false";
-    let limits = format!("memory = \"{memory} MiB\"\nthreads = 2");
+/// Returns the configuration of a job that reads `urls` and writes to `output`.
+fn toml_of(urls: &[String], output: &Path, arguments: &Arguments) -> String {
+    let format = if arguments.flat { "glb" } else { "3dtiles" };
+    let tiles = format!("format = {format:?}\ncompression = \"none\"\nlevels = false");
+    let limits = format!("memory = \"{} MiB\"\nthreads = 2", arguments.memory);
     format!("[input]\nfiles = {urls:?}\n[output]\ndirectory = {output:?}\n{tiles}\n[limits]\n{limits}\n")
 }
 
