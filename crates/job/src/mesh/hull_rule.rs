@@ -149,7 +149,7 @@ mod tests {
         let rule = HullRule::of_points(1, 1, SPACINGS);
         assert_eq!(rule.flow([[0, 0], [11, 0], [5, 1]]), Some(0));
         assert_eq!(rule.flow([[5, 1], [0, 0], [11, 0]]), Some(1));
-        assert_eq!(rule.flow([[0, 0], [10, 0], [5, 1]]), None, "not long");
+        assert_eq!(rule.flow([[0, 0], [9, 0], [5, 1]]), None, "not long");
         assert_eq!(rule.flow([[0, 0], [40, 0], [20, 20]]), None, "a right angle");
         let known = HashSet::from([[[0, 0], [5, 1], [11, 0]]]);
         let of_selected = HullRule { on_ground: Some(Arc::new(known)), ..rule.clone() };
@@ -161,11 +161,11 @@ mod tests {
 
     #[test]
     fn a_few_points_at_its_border_do_not_put_a_triangle_on_ground() {
-        // A point for each step: half of 1,600 squares.
+        // A point for each step, or 2,500 / 2,048 in three bits: half of 1,600 squares.
         let (rule, corners) = (HullRule::of_points(1, 1, SPACINGS_OF_SELECTED), [[0, 0], [40, 0], [0, 40]]);
-        assert!(rule.has_ground(corners, 50) && !rule.has_ground(corners, 49) && !rule.has_ground(corners, 0));
+        assert!(rule.has_ground(corners, 62) && !rule.has_ground(corners, 61) && !rule.has_ground(corners, 0));
         let thin = [[0, 0], [80, 0], [40, 1]];
-        assert!(rule.has_ground(thin, 10) && !rule.has_ground(thin, 9));
+        assert!(rule.has_ground(thin, 12) && !rule.has_ground(thin, 11));
     }
 
     proptest! {

@@ -388,7 +388,7 @@ mod tests {
         assert!(error(&[("l.json", &ftp)]).contains("item \"tile-1\": files can be read by https://"));
         assert!(error(&[("l.json", "{\"type\": 1}")]).contains("at line 1 column"));
         assert!(error(&[("l.json", "{}")]).contains("not a list of point clouds"));
-        assert!(error(&[("l.json", r#"{"hierarchyType": "json"}"#)]).contains("call it ept.json"));
+        assert!(error(&[("l.json", r#"{"hierarchyType": "json"}"#)]).contains("rename it to ept.json"));
         let circle = r#"{"type": "Catalog", "links": [{"rel": "child", "href": "l.json"}]}"#;
         assert!(error(&[("l.json", circle)]).contains("leads back to"));
         let next = r#"{"type": "FeatureCollection", "links": [{"rel": "next", "href": "l.json"}]}"#;
