@@ -267,11 +267,13 @@ fn the_user_states_the_unit_of_heights() {
     assert_eq!(metres(&[&silent], "unit = \"foot\"\nheight_unit = \"metre\"").0, [0.3048, 1.0]);
     // A CRS of the user overrides those of files, and so does the unit beside it.
     assert_eq!(metres(&[&feet], &format!("{crs}\nheight_unit = \"us-foot\"")).0, [1.0, US_FOOT]);
-    let transformed = Job::on(&[&silent]).with("input", &format!("{chosen}\nto_crs = \"EPSG:32634\""));
-    transformed.report();
-    let place: Value = serde_json::from_slice(&fs::read(transformed.out().join("georeference.json")).unwrap()).unwrap();
-    let highest = place["bounds"][1][2].as_f64().unwrap();
-    assert!((highest - 2.75 * 0.3048).abs() < 0.006, "{place}");
+    for (to, unit, highest) in [("EPSG:32634", 0.3048, 2.75), ("EPSG:32634+5773", 1.0, 2.75 * 0.3048)] {
+        let job = Job::on(&[&silent]).with("input", &format!("{chosen}\nto_crs = {to:?}"));
+        job.report();
+        let place: Value = serde_json::from_slice(&fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
+        assert_eq!(place["metres_per_unit_z"].as_f64(), Some(unit), "{place}");
+        assert!((place["bounds"][1][2].as_f64().unwrap() - highest).abs() < 0.006, "{place}");
+    }
     for input in ["height_unit = \"metre\"", "crs = \"EPSG:32633+5773\"\nheight_unit = \"foot\""] {
         Job::on(&[&feet]).with("input", input).run().refused(2, &["[input] height_unit is ", "leave height_unit out"]);
     }
