@@ -38,7 +38,7 @@ pub(crate) fn is_remote(path: &Path) -> bool {
     path.to_str().is_some_and(is_url)
 }
 
-/// Returns the public name of the file or of the files at a URL, and keeps its query for [`address`].
+/// Returns the public name of the file or of the files at a URL, and keeps its query for those who open it.
 ///
 /// # Errors
 /// A sentence about a URL that no file can be read by. It does not tell the query.
