@@ -1,6 +1,7 @@
 //! The ground of a cloud: which points lie on it.
 
 use crate::cells::{Cells, SIDE, split};
+use crate::density::{CoveredArea, PointCollector};
 use crate::find::{GroundCells, allowed_distance, find_ground};
 use crate::lowest::{LowestHeights, metres_above};
 use crate::metric_lattice::{MetricLattice, SquareCells};
@@ -51,6 +52,23 @@ pub struct Ground {
 }
 
 impl Ground {
+    /// Finds the ground of `points`, which are all in memory. Calls `check` now and then, to be stopped.
+    ///
+    /// # Errors
+    /// Those of `check`.
+    pub fn of_points<E>(
+        lattice: MetricLattice,
+        points: impl Iterator<Item = [i32; 3]> + Clone,
+        sizes: GroundSizes,
+        check: impl Fn() -> Result<(), E>,
+    ) -> Result<Ground, E> {
+        let mut area = CoveredArea::new(lattice);
+        area.add(points.clone());
+        let mut lowest = LowestHeights::new(&area);
+        lowest.add(points);
+        Ground::find(&lowest, sizes, check)
+    }
+
     /// Finds the ground of the cloud with these lowest points. Calls `check` now and then, to be stopped.
     ///
     /// # Errors

@@ -90,12 +90,8 @@ fn found(points: &[Labelled]) -> Ground {
 }
 
 fn found_on(lattice: MetricLattice, points: &[Labelled]) -> Ground {
-    let all = || points.iter().map(|(point, _)| *point);
-    let mut area = CoveredArea::new(lattice);
-    area.add(all());
-    let mut lowest = LowestHeights::new(&area);
-    lowest.add(all());
-    Ground::find(&lowest, GroundSizes::default(), || Ok::<_, ()>(())).unwrap()
+    let points = points.iter().map(|(point, _)| *point);
+    Ground::of_points(lattice, points, GroundSizes::default(), || Ok::<_, ()>(())).unwrap()
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What the bands of a picture mean.
 
-use crate::errors::{Trouble, if_there};
+use crate::errors::{PhotoError, if_there};
 use crate::image::Image;
 use tiff::tags::Tag;
 
@@ -36,9 +36,9 @@ pub(crate) struct Bands {
 
 impl Bands {
     /// Returns the bands of an image, or what is wrong with it.
-    pub(crate) fn of(image: &mut Image) -> Result<Bands, Trouble> {
+    pub(crate) fn of(image: &mut Image) -> Result<Bands, PhotoError> {
         let mut number = |tag, default| match image.find_tag(tag)? {
-            Some(value) => value.into_u16().map_err(Trouble::from),
+            Some(value) => value.into_u16().map_err(PhotoError::from),
             None => Ok(default),
         };
         let (count, photometric) =

@@ -1,7 +1,7 @@
 //! The tiles or strips of a picture, read one by one. The last ones stay in memory.
 
 use crate::bands::Bands;
-use crate::errors::{Trouble, if_there};
+use crate::errors::{PhotoError, if_there};
 use crate::image::Image;
 use crate::jpeg;
 use std::collections::VecDeque;
@@ -83,7 +83,7 @@ impl Chunks {
     ///
     /// # Errors
     /// What is wrong with the picture.
-    pub(crate) fn new(mut image: Image, bands: Bands, most_bytes: u64) -> Result<Chunks, Trouble> {
+    pub(crate) fn new(mut image: Image, bands: Bands, most_bytes: u64) -> Result<Chunks, PhotoError> {
         let (width, height) = image.dimensions()?;
         let (columns, rows) = image.chunk_dimensions();
         let grid = ChunkGrid { size: [width, height], chunk: [columns, rows.min(height)] };
@@ -127,7 +127,7 @@ impl Chunks {
     ///
     /// # Errors
     /// What is wrong with the picture.
-    pub(crate) fn get(&self, number: u32) -> Result<Arc<Chunk>, Trouble> {
+    pub(crate) fn get(&self, number: u32) -> Result<Arc<Chunk>, PhotoError> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(at) = state.recent.iter().position(|(known, _)| *known == number) {
             let found = state.recent.remove(at);
@@ -144,7 +144,7 @@ impl Chunks {
         Ok(state.keep((number, chunk)))
     }
 
-    fn read(&self, image: &mut Image, number: u32) -> Result<Chunk, Trouble> {
+    fn read(&self, image: &mut Image, number: u32) -> Result<Chunk, PhotoError> {
         let place = self.places.get(number as usize).copied();
         let (offset, count) = place.ok_or("it is not there")?;
         if count == 0 {

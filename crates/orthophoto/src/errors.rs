@@ -7,66 +7,66 @@ use tiff::{TiffError, TiffResult};
 
 /// What is wrong with a picture.
 #[derive(Debug)]
-pub(crate) enum Trouble {
+pub(crate) enum PhotoError {
     /// It cannot be read as it is: a sentence about it.
     Bad(String),
     /// The system or the server did not hand it out.
     Io(std::io::Error),
 }
 
-impl Trouble {
+impl PhotoError {
     /// Returns the error about the picture called `path`.
     pub(crate) fn about(self, path: &Path) -> Error {
         match self {
-            Trouble::Bad(what) => Error::input(path, format!("[output] color: {what}")),
-            Trouble::Io(error) => Error::io("read", path)(error),
+            PhotoError::Bad(what) => Error::input(path, format!("[output] color: {what}")),
+            PhotoError::Io(error) => Error::io("read", path)(error),
         }
     }
 
-    /// Says of what is wrong where it was met.
-    pub(crate) fn with(self, place: impl std::fmt::Display) -> Trouble {
+    /// Returns the error with `place` in front of its sentence.
+    pub(crate) fn with(self, place: impl std::fmt::Display) -> PhotoError {
         match self {
-            Trouble::Bad(what) => Trouble::Bad(format!("{place}: {what}")),
-            Trouble::Io(error) => Trouble::Io(error),
+            PhotoError::Bad(what) => PhotoError::Bad(format!("{place}: {what}")),
+            PhotoError::Io(error) => PhotoError::Io(error),
         }
     }
 }
 
-impl From<String> for Trouble {
-    fn from(what: String) -> Trouble {
-        Trouble::Bad(what)
+impl From<String> for PhotoError {
+    fn from(what: String) -> PhotoError {
+        PhotoError::Bad(what)
     }
 }
 
-impl From<&str> for Trouble {
-    fn from(what: &str) -> Trouble {
-        Trouble::Bad(what.into())
+impl From<&str> for PhotoError {
+    fn from(what: &str) -> PhotoError {
+        PhotoError::Bad(what.into())
     }
 }
 
-impl From<std::io::Error> for Trouble {
-    fn from(error: std::io::Error) -> Trouble {
+impl From<std::io::Error> for PhotoError {
+    fn from(error: std::io::Error) -> PhotoError {
         match error.kind() {
-            // Of what a file says of itself, and not of the disk.
+            // The file is to blame for these, not the disk.
             ErrorKind::UnexpectedEof | ErrorKind::InvalidData | ErrorKind::InvalidInput => {
-                Trouble::Bad(error.to_string())
+                PhotoError::Bad(error.to_string())
             }
-            _ => Trouble::Io(error),
+            _ => PhotoError::Io(error),
         }
     }
 }
 
-impl From<TiffError> for Trouble {
-    fn from(error: TiffError) -> Trouble {
+impl From<TiffError> for PhotoError {
+    fn from(error: TiffError) -> PhotoError {
         match error {
             TiffError::IoError(error) => error.into(),
-            other => Trouble::Bad(other.to_string()),
+            other => PhotoError::Bad(other.to_string()),
         }
     }
 }
 
 /// Returns the value of a tag, or none at all where it is missing or of another kind.
-pub(crate) fn if_there<T: Default>(found: TiffResult<T>) -> std::result::Result<T, Trouble> {
+pub(crate) fn if_there<T: Default>(found: TiffResult<T>) -> std::result::Result<T, PhotoError> {
     match found {
         Err(TiffError::IoError(error)) => Err(error.into()),
         found => Ok(found.unwrap_or_default()),

@@ -1,6 +1,6 @@
 //! Where the pixels of a picture are.
 
-use crate::errors::{Trouble, if_there};
+use crate::errors::{PhotoError, if_there};
 use crate::image::Image;
 use crs::from_records::from_records;
 use crs::geokeys::GeoKeys;
@@ -23,7 +23,7 @@ pub(crate) struct PixelGrid {
 
 impl PixelGrid {
     /// Returns the grid of an image, or what is wrong with it.
-    pub(crate) fn of(image: &mut Image) -> Result<PixelGrid, Trouble> {
+    pub(crate) fn of(image: &mut Image) -> Result<PixelGrid, PhotoError> {
         let mut numbers = |tag| if_there(image.get_tag_f64_vec(tag));
         let (scale, tie) = (numbers(Tag::ModelPixelScaleTag)?, numbers(Tag::ModelTiepointTag)?);
         let matrix = numbers(Tag::ModelTransformationTag)?;
@@ -76,7 +76,7 @@ fn whole(value: f64, limit: u32) -> Option<u32> {
 }
 
 /// Returns the CRS of an image, or what is wrong with it.
-pub(crate) fn crs_of(image: &mut Image, warnings: &mut Warnings) -> Result<Crs, Trouble> {
+pub(crate) fn crs_of(image: &mut Image, warnings: &mut Warnings) -> Result<Crs, PhotoError> {
     let directory = if_there(image.get_tag_u16_vec(Tag::GeoKeyDirectoryTag))?;
     let doubles = if_there(image.get_tag_f64_vec(Tag::GeoDoubleParamsTag))?;
     let texts = if_there(image.get_tag_ascii_string(Tag::GeoAsciiParamsTag))?;

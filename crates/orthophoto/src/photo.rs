@@ -2,7 +2,7 @@
 
 use crate::bands::Bands;
 use crate::chunks::Chunks;
-use crate::errors::Trouble;
+use crate::errors::PhotoError;
 use crate::georeference::{PixelGrid, crs_of, way};
 use crate::image::PictureBytes;
 use crs::{Crs, CrsTransform};
@@ -40,11 +40,11 @@ impl Orthophoto {
     /// `most_bytes` bytes of memory.
     ///
     /// # Errors
-    /// [`sys::Error::Input`] if it is no picture that can be read, does not tell where it is, or its CRS cannot be reached; [`sys::Error::Io`] if
-    /// the bytes cannot be read.
+    /// [`sys::Error::Input`] if it is not a readable GeoTIFF, is not georeferenced, or the CRS of the points cannot be transformed into its own;
+    /// [`sys::Error::Io`] if the bytes cannot be read.
     pub fn open(path: &Path, bytes: Box<dyn PictureBytes>, points: &Crs, most_bytes: u64) -> Result<Orthophoto> {
         let read = catch_panic(|| Orthophoto::read(path, bytes, points, most_bytes));
-        let read = read.unwrap_or_else(|e| Err(Trouble::Bad(e.to_string()).with(NO_GEOTIFF)));
+        let read = read.unwrap_or_else(|e| Err(PhotoError::Bad(e.to_string()).with(NO_GEOTIFF)));
         read.map_err(|what| what.about(path))
     }
 
@@ -53,8 +53,8 @@ impl Orthophoto {
         bytes: Box<dyn PictureBytes>,
         points: &Crs,
         most_bytes: u64,
-    ) -> std::result::Result<Orthophoto, Trouble> {
-        let mut image = Decoder::new(bytes).map_err(|e| Trouble::from(e).with(NO_GEOTIFF))?;
+    ) -> std::result::Result<Orthophoto, PhotoError> {
+        let mut image = Decoder::new(bytes).map_err(|e| PhotoError::from(e).with(NO_GEOTIFF))?;
         let bands = Bands::of(&mut image)?;
         let pixels = PixelGrid::of(&mut image)?;
         let mut warnings = Warnings::default();

@@ -280,6 +280,7 @@ pub enum UnitChoice {
 }
 
 impl UnitChoice {
+    /// Tells whether the files decide.
     fn is_auto(&self) -> bool {
         *self == UnitChoice::Auto
     }

@@ -216,6 +216,49 @@ pub(crate) fn is_box<const N: usize>(min: [f64; N], max: [f64; N]) -> bool {
 }
 
 impl Source {
+    /// Returns the source of a file with these points, before anything is known of it but its axes: it claims no record, and its points may
+    /// have anything but a colour.
+    fn of(file: &RandomAccessFile, format: FileFormat, axes: [Axis; 3], points: PointData) -> Source {
+        Source {
+            path: file.path().to_path_buf(),
+            size: file.size(),
+            format,
+            version: None,
+            point_format: None,
+            records: 0,
+            missing: 0,
+            min: [0.0; 3],
+            max: [0.0; 3],
+            grid: [axes[0].scale, axes[1].scale],
+            axes,
+            has_rgb: false,
+            has_class: true,
+            has_returns: true,
+            has_intensity: true,
+            crs: Crs::default(),
+            unit_of_false_record: None,
+            by_return: Vec::new(),
+            warnings: Warnings::default(),
+            transform: None,
+            nodata: Vec::new(),
+            kept_heights: None,
+            measured: None,
+            is_left_aside: false,
+            points,
+        }
+    }
+
+    /// Returns a source of binary points as `choice` wants it: without a false CRS, and without the heights that it leaves out.
+    ///
+    /// # Errors
+    /// Those of [`Source::drop_false_geocentric_crs`] and [`Source::find_nodata`].
+    fn with_choice(mut self, choice: &RowChoice) -> Result<Source> {
+        self.drop_false_geocentric_crs(choice.is_crs_stated)?;
+        self.keep_heights(choice);
+        self.find_nodata(choice)?;
+        Ok(self)
+    }
+
     /// Returns the box of the points that the job wants, its least and its greatest x, y, z, if that is known without decoding: for
     /// text, and where all points have been looked at. Those that are left out as outliers are not in it.
     pub fn wanted_box(&self) -> Option<[[f64; 3]; 2]> {

@@ -11,7 +11,7 @@ fn the_messages_of_troubleshooting_are_those_of_the_program() {
     let tables = page.tables();
     let rows = tables.iter().filter(|table| table[0][0] == "message").flat_map(|table| &table[1..]);
     let messages: Vec<String> = rows.flat_map(|row| code(&row[0])).collect();
-    assert!(messages.len() > 30, "{}", messages.len());
+    assert!(messages.len() > 50, "{}", messages.len());
     for message in &messages {
         for part in message.split("...").map(str::trim).filter(|part| part.len() > 3) {
             assert!(all.contains(part), "no source has {part:?} of {message:?}");

@@ -5,7 +5,7 @@
 
 use crate::plan::height_groups::{HeightBins, HeightGroup};
 use delaunay::geometry::{Bounds, Site, bounds_of};
-use ground::{CoveredArea, Ground, GroundSizes, LowestHeights, MetricLattice, PointCollector};
+use ground::{Ground, GroundSizes, MetricLattice};
 use points::{DecodedChunks, Extremes, OptionalFields, PointCounts, PointRules, Source};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -164,11 +164,7 @@ impl HeightSample {
     /// [`sys::Error::Interrupted`].
     pub(crate) fn on_ground(self, lattice: MetricLattice, sizes: GroundSizes) -> Result<HeightSample> {
         let corners = || self.points.iter().map(|([x, y], z)| [*x, *y, *z]);
-        let mut area = CoveredArea::new(lattice);
-        area.add(corners());
-        let mut lowest = LowestHeights::new(&area);
-        lowest.add(corners());
-        let ground = Ground::find(&lowest, sizes, interrupt::check)?;
+        let ground = Ground::of_points(lattice, corners(), sizes, interrupt::check)?;
         let mut heights: Vec<i32> =
             corners().filter(|corner| ground.has(*corner)).map(|[_, _, height]| height).collect();
         heights.sort_unstable();

@@ -13,7 +13,7 @@ use crate::progress::number_text::{grouped, mebibytes, rough};
 use crate::publish::contours::check::TerrainLevels;
 use delaunay::geometry::Site;
 use delaunay::triangulation::canonical;
-use ground::{CoveredArea, Ground, LowestHeights, PointCollector};
+use ground::Ground;
 use points::surface::{MeshOf, Surface};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -216,11 +216,8 @@ fn config_error(error: crate::Error) -> Error {
 
 /// Returns those of some points that are on the ground, as far as these points alone tell.
 fn on_ground(plan: &Plan, mut points: Vec<[i32; 3]>) -> Result<Vec<[i32; 3]>> {
-    let mut area = CoveredArea::new(metric_lattice(plan));
-    area.add(points.iter().copied());
-    let mut lowest = LowestHeights::new(&area);
-    lowest.add(points.iter().copied());
-    let ground = Ground::find(&lowest, plan.options.input.bare_earth, interrupt::check)?;
+    let sizes = plan.options.input.bare_earth;
+    let ground = Ground::of_points(metric_lattice(plan), points.iter().copied(), sizes, interrupt::check)?;
     points.retain(|point| ground.has(*point));
     Ok(points)
 }

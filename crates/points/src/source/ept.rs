@@ -28,36 +28,16 @@ impl Source {
         if min.iter().chain(&max).any(|value| !value.is_finite()) {
             return Err(Error::input(file.path(), "has bounds that are not finite numbers"));
         }
-        let mut source = Source {
-            path: file.path().to_path_buf(),
-            size: file.size(),
-            format: FileFormat::Ept,
-            version: None,
-            point_format: None,
+        let source = Source {
             records: index.points,
             missing: points.missing,
             min,
             max,
-            grid: [index.axes[0].scale, index.axes[1].scale],
-            axes: index.axes,
             has_rgb: index.has_rgb,
-            has_class: true,
-            has_returns: true,
-            has_intensity: true,
             crs: plausible(index.crs, min, max, &mut warnings),
-            unit_of_false_record: None,
-            by_return: Vec::new(),
             warnings,
-            transform: None,
-            nodata: Vec::new(),
-            kept_heights: None,
-            measured: None,
-            is_left_aside: false,
-            points: PointData::Ept(Box::new(points)),
+            ..Source::of(file, FileFormat::Ept, index.axes, PointData::Ept(Box::new(points)))
         };
-        source.drop_false_geocentric_crs(choice.is_crs_stated)?;
-        source.keep_heights(choice);
-        source.find_nodata(choice)?;
-        Ok(source)
+        source.with_choice(choice)
     }
 }

@@ -36,36 +36,20 @@ impl Source {
                 header.records
             ));
         }
-        let mut source = Source {
-            path: file.path().to_path_buf(),
-            size: file.size(),
-            format: if header.compressed { FileFormat::Laz } else { FileFormat::Las },
+        let format = if header.compressed { FileFormat::Laz } else { FileFormat::Las };
+        let source = Source {
             version: Some([1, header.minor]),
             point_format: Some(header.format),
             records: header.records,
             missing,
             min: header.min,
             max: header.max,
-            axes: header.axes,
-            grid: [header.axes[0].scale, header.axes[1].scale],
             has_rgb: RecordLayout::new(header.format, header.record_length).has_rgb(),
-            has_class: true,
-            has_returns: true,
-            has_intensity: true,
             crs,
-            unit_of_false_record: None,
             by_return: header.by_return,
             warnings,
-            transform: None,
-            nodata: Vec::new(),
-            kept_heights: None,
-            measured: None,
-            is_left_aside: false,
-            points,
+            ..Source::of(file, format, header.axes, points)
         };
-        source.drop_false_geocentric_crs(choice.is_crs_stated)?;
-        source.keep_heights(choice);
-        source.find_nodata(choice)?;
-        Ok(source)
+        source.with_choice(choice)
     }
 }

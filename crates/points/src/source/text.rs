@@ -14,31 +14,18 @@ impl Source {
         let mut warnings = Warnings::default();
         let table = TextTable::scan(file, options, choice, &mut warnings)?;
         Ok(Source {
-            path: file.path().to_path_buf(),
-            size: file.size(),
-            format: FileFormat::Text,
-            version: None,
-            point_format: None,
             records: table.records + table.missing,
             missing: table.missing,
             min: table.min,
             max: table.max,
-            axes: table.axes(),
             grid: table.grid(),
             has_rgb: table.has_rgb(),
             has_class: table.has_class(),
             has_returns: table.has_returns(choice.returns),
             has_intensity: table.has_intensity(),
             crs: Crs { horizontal: table.unit, vertical: table.unit_z, ..Crs::default() },
-            unit_of_false_record: None,
-            by_return: Vec::new(),
             warnings,
-            transform: None,
-            nodata: Vec::new(),
-            kept_heights: None,
-            measured: None,
-            is_left_aside: false,
-            points: PointData::Text(Box::new(table)),
+            ..Source::of(file, FileFormat::Text, table.axes(), PointData::Text(Box::new(table)))
         })
     }
 }
