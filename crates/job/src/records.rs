@@ -99,6 +99,8 @@ pub enum StepRecord {
     Spacing,
     /// [`LevelSummary`]
     Level(NodeIndex),
+    /// The mesh that a coarser tile has for the one above it: see `levels/level_mesh.rs`.
+    LevelMesh(NodeIndex),
     /// [`TileSummary`] of an exact tile.
     Tile(TileIndex),
 }
@@ -120,6 +122,7 @@ impl RecordKey for StepRecord {
             StepRecord::Selected => [12, 0],
             StepRecord::OnGround => [13, 0],
             StepRecord::Ground => [14, 0],
+            StepRecord::LevelMesh(node) => [15, node.0],
         }
     }
 }
@@ -387,15 +390,15 @@ pub struct TileSummary {
     pub greatest_error: f64,
     /// About the mean vertical distance to the vertices of the exact mesh in metres.
     pub typical_error: f64,
-    /// The least and greatest lattice x, y, z of the exact mesh below. Without a triangle, the least are greater.
+    /// The least and greatest lattice x, y, z of the exact mesh below and of the tile. Without a triangle, the least are greater.
     corners: [[i32; 3]; 2],
-    /// The vertices of its GLB; 0 if there is none.
+    /// The vertices of the mesh that the tile above it is made from; 0 if there is none.
     pub vertices: u32,
     unused: u32,
 }
 
 impl TileSummary {
-    /// Returns the summary of a tile over the exact mesh within `bounds`, whose GLB has `vertices`; 0 if there is no GLB.
+    /// Returns the summary of a tile over the exact mesh within `bounds`, whose mesh has `vertices`; 0 if there is no GLB.
     pub fn new(bounds: Option<Bounds<3>>, vertices: usize) -> TileSummary {
         let corners = bounds.map_or([[1; 3], [0; 3]], |bounds| [bounds.min, bounds.max]);
         TileSummary {
@@ -426,7 +429,14 @@ impl TileSummary {
         Ok(own)
     }
 
-    /// Returns the box of the exact mesh below; `None` if it has no triangle.
+    /// Makes the box large enough for `bounds` too.
+    pub fn include(&mut self, bounds: Option<Bounds<3>>) {
+        if let Some(all) = self.bounds().into_iter().chain(bounds).reduce(Bounds::union) {
+            self.corners = [all.min, all.max];
+        }
+    }
+
+    /// Returns the box of the exact mesh below and of the tile; `None` if there is no triangle.
     pub fn bounds(&self) -> Option<Bounds<3>> {
         let [min, max] = self.corners;
         (min[0] <= max[0]).then_some(Bounds { min, max })

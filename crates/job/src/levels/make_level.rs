@@ -4,14 +4,16 @@ use crate::durable::atomic_file::PendingFile;
 use crate::durable::directory::JobDirectory;
 use crate::index::{NodeIndex, PartIndex};
 use crate::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
+use crate::levels::level_mesh::{load_mesh, save_mesh};
 use crate::partition::tree::{NodeKind, Tree};
-use crate::records::{LevelSummary, Store, TileSummary};
+use crate::records::{LevelSummary, StepRecord, Store, TileSummary};
 use crate::tiles::style::TileStyle;
 use crate::tiles::write_tile::write_glb;
 use delaunay::geometry::Bounds;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use sys::{Error, Result};
 use tiles::frame::Frame;
 use tiles::gltf::read::{TileFile, read_tile};
@@ -62,6 +64,8 @@ pub(crate) struct LevelContext<'a> {
     pub part: PartIndex,
     /// Returns the topmost tile of a part.
     pub top_of: TopOf<'a>,
+    /// Whether an update may make a tile again from the meshes of those below.
+    pub keeps_meshes: bool,
 }
 
 /// Returns the topmost tile of a part.
@@ -97,7 +101,7 @@ pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<(LevelS
         match memory_for(&children).filter(|bytes| *bytes <= context.sizes.memory) {
             None => stats.left_out = 1,
             Some(_) => {
-                let (tile, simple) = simplified(context, coarse.node, &children)?;
+                let Level { shown, exact, simple } = Level::of(context, coarse.node, &children)?;
                 let of_children =
                     |error: fn(&TileSummary) -> f64| children.iter().map(|c| error(&c.own)).fold(0.0, f64::max);
                 // No distance is greater than the range of heights: both meshes lie within it.
@@ -108,14 +112,21 @@ pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<(LevelS
                 own.typical_error = (before * before + simple.typical_error * simple.typical_error).sqrt();
                 let seen = seen_error(simple.spacing, own.typical_error, &context.style.frame, bounds);
                 own.error = seen.max(of_children(|own| own.error));
-                own.vertices = tile.positions.len() as u32;
+                own.vertices = exact.positions.len() as u32;
+                own.include(shown.bounds());
+                save_mesh(context.store, coarse.node, &exact)?;
                 let path = context.directory.output().level(context.part.node_number(coarse.node));
-                let written = write_glb(&path, &tile, context.style)?;
-                let triangles = tile.triangles.len() as u64;
+                let written = write_glb(&path, &shown, context.style)?;
+                let triangles = shown.triangles.len() as u64;
                 stats =
                     LevelStats { files: 1, triangles, bytes: written.bytes, error_m: own.greatest_error, left_out: 0 };
                 files.push(written);
             }
+        }
+    }
+    for child in children.iter().filter(|_| !context.keeps_meshes) {
+        if let ChildMesh::Record(node) = child.mesh {
+            context.store.free(StepRecord::LevelMesh(node))?;
         }
     }
     let leaves = children.iter().filter(|child| child.exact).map(|child| child.own).collect();
@@ -140,19 +151,35 @@ fn memory_for(children: &[Child]) -> Option<u64> {
     whole.then(|| vertices.saturating_mul(BYTES_PER_LEVEL_VERTEX))
 }
 
-/// Joins and simplifies the meshes of `children`, the tiles below `node`. Returns the coarser tile and what is known of it.
-fn simplified(context: &LevelContext, node: NodeIndex, children: &[Child]) -> Result<(Tile, Simplified)> {
-    let vertices = children.iter().map(|child| child.own.vertices as usize).sum();
-    let mut joining = Joining::new(&context.style.frame, vertices);
-    for child in children.iter().filter(|child| child.own.vertices > 0) {
-        joining.add(read_own(&child.path)?).map_err(|what| contradiction(node, &what))?;
+/// A coarser tile.
+struct Level {
+    /// What viewers get.
+    shown: Tile,
+    /// What the tile above is made from.
+    exact: Tile,
+    /// What is known of them, without the meshes.
+    simple: Simplified,
+}
+
+impl Level {
+    /// Joins and simplifies the meshes of `children`, the tiles below `node`.
+    fn of(context: &LevelContext, node: NodeIndex, children: &[Child]) -> Result<Level> {
+        let vertices = children.iter().map(|child| child.own.vertices as usize).sum();
+        let mut joining = Joining::new(&context.style.frame, vertices);
+        for child in children.iter().filter(|child| child.own.vertices > 0) {
+            match &child.mesh {
+                ChildMesh::File(path) => joining.add(read_own(path)?).map_err(|what| contradiction(node, &what))?,
+                ChildMesh::Record(of_child) => joining.add_mesh(load_mesh(context.store, *of_child)?),
+                ChildMesh::OfPart(store, of_child) => joining.add_mesh(load_mesh(store, *of_child)?),
+            }
+        }
+        let joined = joining.finish();
+        let terrain = joined.terrain();
+        let target = context.sizes.target(terrain.triangles.len());
+        let mut simple = simplify(&context.style.frame, &terrain, target, context.style.lines.as_deref())?;
+        let (shown, exact) = (std::mem::take(&mut simple.shown), std::mem::take(&mut simple.exact));
+        Ok(Level { shown: joined.shown_tile(shown), exact: joined.tile(exact), simple })
     }
-    let joined = joining.finish();
-    let terrain = joined.terrain();
-    let target = context.sizes.target(terrain.triangles.len());
-    let mut simple = simplify(&context.style.frame, &terrain, target, context.style.lines.as_deref())?;
-    let mesh = std::mem::take(&mut simple.mesh);
-    Ok((joined.tile(mesh), simple))
 }
 
 /// Returns the range of heights in metres.
@@ -170,22 +197,32 @@ pub(crate) struct Child {
     own: TileSummary,
     /// Whether it is an exact tile of the same part.
     exact: bool,
-    /// Its GLB, if there is one.
-    path: PathBuf,
+    /// Where its mesh is, if there is one.
+    mesh: ChildMesh,
+}
+
+/// Where the mesh of a child is.
+enum ChildMesh {
+    /// In the GLB of an exact tile.
+    File(PathBuf),
+    /// In the record of a coarser tile of the same part.
+    Record(NodeIndex),
+    /// In the record of the topmost tile of another part.
+    OfPart(Arc<Store>, NodeIndex),
 }
 
 impl Child {
     fn find(context: &LevelContext, child: ChildTile) -> Result<Child> {
-        let output = context.directory.output();
         match child {
             ChildTile::Exact(tile) => {
                 let own = TileSummary::load(context.store, tile)?;
-                Ok(Child { own, exact: true, path: output.tile(tile.number()) })
+                let path = context.directory.output().tile(tile.number());
+                Ok(Child { own, exact: true, mesh: ChildMesh::File(path) })
             }
             ChildTile::Coarse(index) => {
                 let node = context.hierarchy.tiles[index].node;
                 let own = LevelSummary::load(context.store, node)?.own;
-                Ok(Child { own, exact: false, path: output.level(context.part.node_number(node)) })
+                Ok(Child { own, exact: false, mesh: ChildMesh::Record(node) })
             }
             ChildTile::Part(part) => (context.top_of)(part),
         }
@@ -195,16 +232,18 @@ impl Child {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Broken`] on the part's store.
-    pub(crate) fn top(directory: &JobDirectory, store: &Store, tree: &Tree) -> Result<Child> {
-        let output = directory.output();
-        let (own, path) = match tree.node(NodeIndex::ROOT).kind {
-            NodeKind::Leaf(tile) => (TileSummary::load(store, tile)?, output.tile(tile.number())),
+    pub(crate) fn top(directory: &JobDirectory, store: &Arc<Store>, tree: &Tree) -> Result<Child> {
+        let (own, mesh) = match tree.node(NodeIndex::ROOT).kind {
+            NodeKind::Leaf(tile) => {
+                let path = directory.output().tile(tile.number());
+                (TileSummary::load(store, tile)?, ChildMesh::File(path))
+            }
             NodeKind::Inner(_) => {
                 let own = LevelSummary::load(store, NodeIndex::ROOT)?.own;
-                (own, output.level(tree.part.node_number(NodeIndex::ROOT)))
+                (own, ChildMesh::OfPart(store.clone(), NodeIndex::ROOT))
             }
         };
-        Ok(Child { own, exact: false, path })
+        Ok(Child { own, exact: false, mesh })
     }
 }
 

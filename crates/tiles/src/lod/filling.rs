@@ -1,17 +1,16 @@
-//! The triangulation of some vertices of a terrain within the terrain's boundary. It can take in more vertices.
+//! The triangulation of some vertices of a terrain. It can take in more vertices.
 
 use crate::lod::vertex_cells::plane;
 use delaunay::geometry::Site;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
-use delaunay::mesh::index::SiteIndex;
+use delaunay::mesh::index::{HalfEdgeIndex, SiteIndex};
 use delaunay::mesh::insert::{insert, locate};
 use delaunay::mesh::region::covered;
 use delaunay::triangulation;
 use delaunay::triangulation::canonical;
 use sys::{Error, Result};
 
-/// The Delaunay triangulation of some of a terrain's vertices. The boundary's edges are among its edges, whichever vertices it has: see
-/// `simplify.rs`. So a triangle between vertices of the terrain lies within the boundary as a whole, or not at all.
+/// The Delaunay triangulation of some of a terrain's vertices, among them those on the convex hull of all.
 pub(crate) struct Filling<'a> {
     /// The vertices of the terrain.
     terrain: &'a [[i32; 3]],
@@ -21,41 +20,62 @@ pub(crate) struct Filling<'a> {
     pub(crate) positions: Vec<[i32; 3]>,
     sites: Vec<Site>,
     mesh: HalfEdgeMesh,
-    /// Which triangles of the mesh lie within the boundary.
-    within: Vec<bool>,
 }
 
 impl<'a> Filling<'a> {
-    /// Triangulates those vertices of `terrain` that are `kept`, among them all ends of the `boundary`, which has the terrain on its
-    /// left.
+    /// Triangulates those vertices of `terrain` that are `kept`.
     ///
     /// # Errors
-    /// [`Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation, [`Error::Interrupted`].
-    pub(crate) fn new(terrain: &'a [[i32; 3]], kept: &[bool], boundary: &[[u32; 2]]) -> Result<Filling<'a>> {
+    /// [`Error::Broken`] if they have no triangle, [`Error::Interrupted`].
+    pub(crate) fn new(terrain: &'a [[i32; 3]], kept: &[bool]) -> Result<Filling<'a>> {
         let mut vertices = Vec::with_capacity(kept.iter().filter(|kept| **kept).count());
         vertices.extend((0u32..).zip(kept).filter(|(_, kept)| **kept).map(|(v, _)| v));
-        let mut number = vec![SiteIndex(u32::MAX); kept.len()];
-        vertices.iter().zip(0..).for_each(|(&v, n)| number[v as usize] = SiteIndex(n));
         let positions: Vec<[i32; 3]> = vertices.iter().map(|&v| terrain[v as usize]).collect();
         let sites: Vec<Site> = positions.iter().map(|&p| plane(p)).collect();
         let mesh = canonical(&sites).map_err(|e| Error::of_triangulation(e.is_stopped(), e))?;
-        let boundary: Vec<_> = boundary.iter().map(|edge| edge.map(|v| number[v as usize])).collect();
-        let within = covered(&mesh, &boundary).map_err(|e| Error::of_triangulation(e.is_stopped(), e))?;
-        if !within.contains(&true) {
+        if mesh.triangles.is_empty() {
             return Err(Error::Broken("a terrain without triangles cannot be simplified".into()));
         }
-        Ok(Filling { terrain, vertices, positions, sites, mesh, within })
+        Ok(Filling { terrain, vertices, positions, sites, mesh })
     }
 
-    /// Returns the number of triangles of the mesh, within the boundary and without.
+    /// Returns the triangulation of the vertices that are `kept`, among them all that this one has. They keep their heights.
+    ///
+    /// # Errors
+    /// As [`Filling::new`].
+    pub(crate) fn again_with(self, kept: &[bool]) -> Result<Filling<'a>> {
+        let number = self.numbers();
+        let mut again = Filling::new(self.terrain, kept)?;
+        for (position, &v) in again.positions.iter_mut().zip(&again.vertices) {
+            if let Some(known) = self.positions.get(number[v as usize] as usize) {
+                *position = *known;
+            }
+        }
+        Ok(again)
+    }
+
+    /// Returns the number of triangles.
     pub(crate) fn triangles(&self) -> usize {
         self.mesh.triangles.len()
     }
 
-    /// Returns the corners of a triangle as numbers of sites, or `None` if it does not lie within the boundary.
+    /// Returns the corners of a triangle as numbers of sites.
     #[inline(always)]
-    pub(crate) fn corners(&self, triangle: usize) -> Option<[u32; 3]> {
-        self.within[triangle].then(|| self.mesh.triangles[triangle].map(|v| v.0))
+    pub(crate) fn corners(&self, triangle: usize) -> [u32; 3] {
+        self.mesh.triangles[triangle].map(|v| v.0)
+    }
+
+    /// Returns the triangles that share a side with this one.
+    pub(crate) fn neighbours(&self, triangle: usize) -> impl Iterator<Item = usize> {
+        let twins = HalfEdgeIndex::of_triangle(triangle).map(|h| self.mesh.twin(h));
+        twins.into_iter().filter(|&twin| twin != HalfEdgeIndex::HULL).map(HalfEdgeIndex::triangle)
+    }
+
+    /// Returns the directed edges that have a triangle on the left that is among those that are `shown`, and none on the right.
+    pub(crate) fn border(&self, shown: &[bool]) -> Vec<[u32; 2]> {
+        let is_shown = |h: HalfEdgeIndex| h != HalfEdgeIndex::HULL && shown[h.triangle()];
+        let on_border = self.mesh.half_edges().filter(|&h| is_shown(h) && !is_shown(self.mesh.twin(h)));
+        on_border.map(|h| [self.mesh.origin(h).0, self.mesh.destination(h).0]).collect()
     }
 
     /// Returns the triangle under vertex `v` of the terrain, looking from triangle `start` on; `None` if that takes more than `steps`.
@@ -66,35 +86,57 @@ impl<'a> Filling<'a> {
     /// Takes in vertex `v`, which the mesh does not have, and looks for its place from triangle `start` on. It leaves the vertex out if
     /// that takes more than `steps`.
     pub(crate) fn insert(&mut self, v: u32, start: usize, steps: &mut u64) {
-        let Some(triangle) = self.locate(v, start, steps).filter(|&triangle| self.within[triangle]) else { return };
+        let Some(triangle) = self.locate(v, start, steps) else { return };
         let position = self.terrain[v as usize];
         self.vertices.push(v);
         self.positions.push(position);
         self.sites.push(plane(position));
         insert(&mut self.mesh, &self.sites, SiteIndex::new(self.sites.len() - 1), triangle, |_| {});
-        // Flips cross no edge of the boundary, so triangles stay on their side of it.
-        self.within.resize(self.mesh.triangles.len(), true);
     }
 
-    /// Returns the triangles within the boundary, with the vertices in the order of the terrain. Each is the corner of a triangle.
-    pub(crate) fn into_coarse(self) -> CoarseMesh {
-        let mut order: Vec<u32> = (0..self.vertices.len() as u32).collect();
+    /// Marks the triangles on the left of the directed edges `outline` between vertices of the terrain.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if one of them is not in the triangulation.
+    pub(crate) fn within(&self, outline: &[[u32; 2]]) -> Result<Vec<bool>> {
+        let number = self.numbers();
+        let edges: Vec<_> = outline.iter().map(|edge| edge.map(|v| SiteIndex(number[v as usize]))).collect();
+        covered(&self.mesh, &edges).map_err(|e| Error::of_triangulation(e.is_stopped(), e))
+    }
+
+    /// Returns the number of the site of each vertex of the terrain, `u32::MAX` for those that are left out.
+    pub(crate) fn numbers(&self) -> Vec<u32> {
+        let mut number = vec![u32::MAX; self.terrain.len()];
+        self.vertices.iter().zip(0..).for_each(|(&v, site)| number[v as usize] = site);
+        number
+    }
+
+    /// Returns the triangles that are `shown`, with the vertices in the order of the terrain, and the number there of each site. Each vertex
+    /// is the corner of a triangle.
+    pub(crate) fn coarse(&self, shown: &[bool]) -> (CoarseMesh, Vec<u32>) {
+        let mut triangles = Vec::with_capacity(self.mesh.triangles.len());
+        triangles.extend((0..self.triangles()).filter(|&t| shown[t]).map(|t| self.corners(t)));
+        let mut is_corner = vec![false; self.vertices.len()];
+        triangles.as_flattened().iter().for_each(|&site| is_corner[site as usize] = true);
+        let mut order: Vec<u32> = (0..self.vertices.len() as u32).filter(|&site| is_corner[site as usize]).collect();
         // Most are in order already, which a stable sort makes use of.
         order.sort_by_key(|&site| self.vertices[site as usize]);
-        let mut number = vec![0; order.len()];
+        let mut number = vec![u32::MAX; self.vertices.len()];
         order.iter().zip(0..).for_each(|(&site, n)| number[site as usize] = n);
-        let mut triangles = Vec::with_capacity(self.mesh.triangles.len());
-        let within = (0..self.mesh.triangles.len()).filter_map(|triangle| self.corners(triangle));
-        triangles.extend(within.map(|corners| corners.map(|site| number[site as usize])));
+        triangles.as_flattened_mut().iter_mut().for_each(|corner| *corner = number[*corner as usize]);
         let vertices = order.iter().map(|&site| self.vertices[site as usize]).collect();
         let positions = order.iter().map(|&site| self.positions[site as usize]).collect();
+        (CoarseMesh { vertices, positions, triangles }, number)
+    }
+
+    /// Lets other triangulations have the memory.
+    pub(crate) fn recycle(self) {
         triangulation::recycle(self.mesh);
-        CoarseMesh { vertices, positions, triangles }
     }
 }
 
 /// A mesh between some vertices of a terrain.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct CoarseMesh {
     /// The number in the terrain of every vertex, ascending.
     pub vertices: Vec<u32>,

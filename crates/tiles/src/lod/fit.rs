@@ -29,7 +29,7 @@ pub(crate) fn fit(
         let mut sums = vec![[0.0; 2]; heights.len()];
         let mut total = 0.0;
         for (&triangle, &p) in located.iter().zip(positions) {
-            let Some(corners) = filling.corners(triangle as usize) else { continue };
+            let corners = filling.corners(triangle as usize);
             let weights = weights(corners.map(|site| plane(filling.positions[site as usize])), plane(p));
             let height: f64 = corners.iter().zip(weights).map(|(&site, weight)| weight * heights[site as usize]).sum();
             let distance = f64::from(p[2]) - height;
@@ -69,28 +69,22 @@ mod tests {
     struct Square {
         terrain: Vec<[i32; 3]>,
         kept: Vec<bool>,
-        boundary: Vec<[u32; 2]>,
     }
 
     impl Square {
         fn new(height: impl Fn(i32, i32) -> i32) -> Square {
             let point = |i: i32| [i % 50 * 20, i / 50 * 20, height(i % 50, i / 50)];
             let outermost = |i: i32| [0, 49].contains(&(i % 50)) || [0, 49].contains(&(i / 50));
-            let side = |from: u32, step: u32| (0..49).map(move |k| [from + k * step, from + (k + 1) * step]);
-            let back = |edge: [u32; 2]| [edge[1], edge[0]];
-            let (south, east) = (side(0, 1), side(49, 50));
-            let (north, west) = (side(2_450, 1).map(back), side(0, 50).map(back));
             Square {
                 terrain: (0..2_500).map(point).collect(),
                 kept: (0..2_500).map(|i| i % 7 == 0 || outermost(i)).collect(),
-                boundary: south.chain(east).chain(north).chain(west).collect(),
             }
         }
 
         /// Returns how far each point is above the filling.
         fn distances(&self, filling: &Filling, places: &mut Places) -> Vec<f64> {
             let distance = |(&triangle, &p): (&u32, &[i32; 3])| {
-                let corners = filling.corners(triangle as usize).unwrap().map(|site| filling.positions[site as usize]);
+                let corners = filling.corners(triangle as usize).map(|site| filling.positions[site as usize]);
                 let weights = weights(corners.map(plane), plane(p));
                 f64::from(p[2]) - (0..3).map(|k| weights[k] * f64::from(corners[k][2])).sum::<f64>()
             };
@@ -101,7 +95,7 @@ mod tests {
     #[test]
     fn heights_move_to_the_middle_of_the_points_around_but_for_fixed_ones() {
         let square = Square::new(|x, y| 3 * x + (x + 50 * y) * 7919 % 101);
-        let mut filling = Filling::new(&square.terrain, &square.kept, &square.boundary).unwrap();
+        let mut filling = Filling::new(&square.terrain, &square.kept).unwrap();
         let mut places = Places::new(&square.terrain, &filling);
         let squares = |distances: Vec<f64>| distances.iter().map(|d| d * d).sum::<f64>();
         let before = squares(square.distances(&filling, &mut places));
@@ -118,7 +112,7 @@ mod tests {
     fn stripes_are_neither_lifted_nor_sunk() {
         for sign in [1, -1] {
             let square = Square::new(|x, _| sign * (1_000 * (x % 2) - 500));
-            let mut filling = Filling::new(&square.terrain, &square.kept, &square.boundary).unwrap();
+            let mut filling = Filling::new(&square.terrain, &square.kept).unwrap();
             let mut places = Places::new(&square.terrain, &filling);
             fit(&square.terrain, |_| false, &mut filling, &mut places).unwrap();
             let distances = square.distances(&filling, &mut places);

@@ -9,8 +9,10 @@ use multiversion::multiversion;
 use crate::attributes::{AttributeChoice, PointAttributes};
 use crate::frame::Frame;
 use crate::gltf::read::{TileFile, TilePart};
+use crate::gltf::stored_normals::StoredNormals;
 use crate::lod::boundary::on_boundary;
 use crate::lod::filling::CoarseMesh;
+use crate::lod::rim::ShownMesh;
 use crate::lod::simplify::{NearBoundary, Terrain};
 use crate::tile::Tile;
 
@@ -19,8 +21,8 @@ use crate::tile::Tile;
 #[error("the vertex at {0:?} is not on the job's lattice")]
 pub struct VertexOffLattice([f64; 3]);
 
-/// The number of the vertex at a site.
-type VertexAt = HashMap<[i32; 2], u32, BuildHasherDefault<SiteHasher>>;
+/// The number of the vertex at a lattice point.
+type VertexAt = HashMap<[i32; 3], u32, BuildHasherDefault<PointHasher>>;
 
 /// The mesh of several tiles. What vertices carry besides their positions stays with the tiles until it is asked for: coarser tiles
 /// keep few of the vertices.
@@ -85,15 +87,37 @@ impl<'a> Joining<'a> {
             let positions = std::mem::take(&mut part.positions);
             let points = self.frame.points(&positions, part.translation, part.scale).map_err(VertexOffLattice)?;
             drop(positions);
-            let triangles = std::mem::take(&mut part.triangles);
-            // Only vertices on a boundary can be in another part too.
-            let on_border = on_boundary(points.len(), &triangles);
-            let number = self.joined.parts.len() as u32;
-            let numbers = self.joined.append(number, &points, &on_border, &mut self.vertex_at);
-            self.joined.append_triangles(&triangles, &numbers);
-            self.joined.parts.push(part);
+            self.add_part(&points, part);
         }
         Ok(())
+    }
+
+    /// Joins a mesh as [`Joining::add`] does.
+    pub fn add_mesh(&mut self, tile: Tile) {
+        // As a file has them: y is up.
+        let normals = tile.normals.map(|all| all.into_iter().map(|[east, north, up]| [east, up, -north]).collect());
+        let opaque = |[red, green, blue]: [u16; 3]| [red, green, blue, u16::MAX];
+        let part = TilePart {
+            translation: [0.0; 3],
+            scale: [1.0; 3],
+            positions: Vec::new(),
+            normals: normals.map(StoredNormals::Single),
+            colors: tile.colors.map(|all| all.into_iter().map(opaque).collect()),
+            attributes: tile.attributes,
+            triangles: tile.triangles,
+        };
+        self.add_part(&tile.positions, part);
+    }
+
+    /// Joins the mesh of a part whose vertices are at these lattice `points`.
+    fn add_part(&mut self, points: &[[i32; 3]], mut part: TilePart) {
+        let triangles = std::mem::take(&mut part.triangles);
+        // Only vertices on a boundary can be in another part too.
+        let on_border = on_boundary(points.len(), &triangles);
+        let number = self.joined.parts.len() as u32;
+        let numbers = self.joined.append(number, points, &on_border, &mut self.vertex_at);
+        self.joined.append_triangles(&triangles, &numbers);
+        self.joined.parts.push(part);
     }
 
     /// Returns the mesh of all tiles.
@@ -111,7 +135,7 @@ impl Joined {
         let mut new_from = 0;
         for v in (0..points.len()).filter(|&v| on_border[v]) {
             let next = (self.positions.len() + v - new_from) as u32;
-            let number = *vertex_at.entry([points[v][0], points[v][1]]).or_insert(next);
+            let number = *vertex_at.entry(points[v]).or_insert(next);
             if number != next {
                 self.append_new(part, points, on_border, new_from..v, &mut numbers);
                 numbers.push(number | ON_BORDER);
@@ -180,6 +204,25 @@ impl Joined {
         self.dressed(Tile { positions, triangles, ..Tile::default() }, &vertices)
     }
 
+    /// Returns the tile of what viewers get, as [`Joined::tile`] does.
+    pub fn shown_tile(&self, shown: ShownMesh) -> Tile {
+        let mut tile = self.tile(shown.mesh);
+        let first = tile.positions.len() as u32;
+        let tops: Vec<u32> = shown.bottoms.iter().map(|bottom| bottom.0).collect();
+        repeat(&mut tile.positions, &tops);
+        let bottoms = tile.positions[first as usize..].iter_mut().zip(&shown.bottoms);
+        bottoms.for_each(|(position, bottom)| position[2] = bottom.1);
+        tile.normals.iter_mut().for_each(|all| repeat(all, &tops));
+        tile.colors.iter_mut().for_each(|all| repeat(all, &tops));
+        let attributes = tile.attributes.clone();
+        tops.iter().for_each(|&top| tile.attributes.push_from(&attributes, top as usize));
+        let below = |top: u32| first + tops.partition_point(|other| *other < top) as u32;
+        for [from, to] in shown.skirts {
+            tile.triangles.extend([[below(from), below(to), to], [below(from), to, from]]);
+        }
+        tile
+    }
+
     /// Adds to a tile what these `vertices` carry, which are its own in their order.
     fn dressed(&self, tile: Tile, vertices: &[u32]) -> Tile {
         let origins = self.origins(vertices);
@@ -221,6 +264,12 @@ impl Joined {
     }
 }
 
+/// Appends the values of these vertices once more.
+fn repeat<T: Copy>(all: &mut Vec<T>, vertices: &[u32]) {
+    let again: Vec<T> = vertices.iter().map(|&v| all[v as usize]).collect();
+    all.extend(again);
+}
+
 /// Appends the unit normals (x east, y north, z up) for the `normals` of a mesh that its node stretches by `scale`.
 #[multiversion(targets("x86_64+avx2"))]
 fn append_unscaled(normals: &[[f32; 3]], scale: [f64; 3], all: &mut Vec<[f32; 3]>) {
@@ -231,11 +280,11 @@ fn append_unscaled(normals: &[[f32; 3]], scale: [f64; 3], all: &mut Vec<[f32; 3]
     }));
 }
 
-/// A multiplication: the sites of a mesh need to be spread, not protected.
+/// A multiplication: the points of a mesh need to be spread, not protected.
 #[derive(Default)]
-struct SiteHasher(u64);
+struct PointHasher(u64);
 
-impl Hasher for SiteHasher {
+impl Hasher for PointHasher {
     fn write(&mut self, bytes: &[u8]) {
         for chunk in bytes.chunks(4) {
             let mut word = [0; 4];

@@ -2,12 +2,15 @@
 
 mod boundary;
 mod cell_grid;
+mod covering;
 mod filling;
 mod fit;
 mod height_bounds;
 pub mod join;
 mod kept_lines;
+mod outline;
 mod refine;
+mod rim;
 pub mod simplify;
 mod vertex_cells;
 pub mod vertical_error;

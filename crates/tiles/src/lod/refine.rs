@@ -49,7 +49,7 @@ impl Places {
     }
 
     /// Takes vertex `v` into `filling`.
-    fn insert(&mut self, v: u32, filling: &mut Filling) {
+    pub(crate) fn insert(&mut self, v: u32, filling: &mut Filling) {
         let start = self.triangles[v as usize] as usize;
         filling.insert(v, start, &mut self.steps);
     }
@@ -104,7 +104,7 @@ fn furthest(
     let mut furthest = vec![FarVertex { distance: 0.0, vertex: 0 }; filling.triangles()];
     for v in (first..positions.len()).step_by(every).filter(|&v| !kept[v]) {
         let Some(triangle) = places.locate(v as u32, filling) else { break };
-        let Some(corners) = filling.corners(triangle) else { continue };
+        let corners = filling.corners(triangle);
         let distance = vertical_distance(&corners.map(|site| filling.positions[site as usize]), positions[v]);
         if distance > furthest[triangle].distance && allows(v) {
             furthest[triangle] = FarVertex { distance, vertex: v as u32 };
@@ -129,14 +129,13 @@ struct StartCells {
 }
 
 impl StartCells {
-    /// Notes the triangles of `filling` that lie within the boundary.
+    /// Notes the triangles of `filling`.
     fn new(filling: &Filling) -> StartCells {
         let cells = CellGrid::new(&filling.positions, filling.triangles() / TRIANGLES_PER_CELL + 1);
         let mut triangles = vec![u32::MAX; cells.count()];
         for triangle in 0..filling.triangles() {
-            if let Some([corner, ..]) = filling.corners(triangle) {
-                triangles[cells.of(&filling.positions[corner as usize]) as usize] = triangle as u32;
-            }
+            let [corner, ..] = filling.corners(triangle);
+            triangles[cells.of(&filling.positions[corner as usize]) as usize] = triangle as u32;
         }
         // Where a cell has none, that of the cell before it must do.
         let mut last = triangles.iter().copied().find(|&triangle| triangle != u32::MAX).unwrap_or(0);

@@ -1,23 +1,29 @@
-//! A terrain with fewer triangles, to be seen from afar: the Delaunay triangulation of some of its vertices, within its boundary.
+//! A terrain with fewer triangles, to be seen from afar: the Delaunay triangulation of some of its vertices.
 //!
-//! All vertices and edges of the boundary stay. The edges are edges of the triangulation of all sites of the job, and such an edge is
-//! also an edge of the Delaunay triangulation of any subset that has both its ends, because its empty circle stays empty. So two
-//! terrains that meet along a part of their boundaries still meet there when either or both of them are simplified, the triangles
-//! cover the same ground once, as before, and the program's own pipeline makes them.
+//! One of every cell of a coarse grid stays, and then in a few rounds those vertices that the triangulation is furthest from (`refine.rs`).
+//! At the end the heights are moved to where they are nearest to the terrain around (`fit.rs`). Vertices of breaklines keep their own:
+//! see `kept_lines.rs`. This makes two meshes.
 //!
-//! Inside, one of every cell of a coarse grid stays, and then in a few rounds those vertices that the triangulation is furthest from
-//! (`refine.rs`). At the end the heights of all inner vertices are moved to where they are nearest to the terrain around (`fit.rs`).
-//! Vertices on the boundary keep their own heights, or terrains would not meet. So do vertices of breaklines: see `kept_lines.rs`.
+//! - **What viewers get** has few vertices on the outline of the terrain (`outline.rs`). It covers all of the terrain and a little more, and its
+//!   border hides what neighbours may do with theirs (`rim.rs`).
+//! - **The exact mesh** is what coarser terrains are made of. It takes in all other vertices on the outline too, with their own heights,
+//!   and ends there. The edges of the outline are edges of the triangulation of all sites of the job, and such an edge is also
+//!   an edge of the Delaunay triangulation of any subset that has both its ends, because its empty circle stays empty. So two terrains that
+//!   meet along a part of their outlines still meet there, and together they cover their ground once.
 
 #[cfg(test)]
 mod tests;
 
 use crate::frame::Frame;
+use crate::lod::covering::covering;
 pub use crate::lod::filling::CoarseMesh;
 use crate::lod::filling::Filling;
 use crate::lod::fit::fit;
 use crate::lod::kept_lines::KeptLines;
+use crate::lod::outline::Outline;
 use crate::lod::refine::{Places, refine};
+pub use crate::lod::rim::ShownMesh;
+use crate::lod::rim::shown;
 use crate::lod::vertical_error::vertical_error;
 use breaklines::Breaklines;
 use delaunay::geometry::Bounds;
@@ -46,18 +52,23 @@ pub struct NearBoundary<'a> {
 /// A simplified terrain.
 #[derive(Debug)]
 pub struct Simplified {
-    /// The triangles between some of the vertices.
-    pub mesh: CoarseMesh,
-    /// The greatest vertical distance to the original in metres.
+    /// What viewers get.
+    pub shown: ShownMesh,
+    /// The mesh with all vertices on the outline, which ends there.
+    pub exact: CoarseMesh,
+    /// The greatest vertical distance of either of them to the original in metres.
     pub greatest_error: f64,
     /// The mean vertical distance to the vertices of the original in metres.
     pub typical_error: f64,
-    /// The distance in metres between vertices inside.
+    /// The distance in metres between vertices.
     pub spacing: f64,
 }
 
-/// Vertices that stay inside for each triangle that is wanted, at least, however many vertices the boundary has.
+/// Vertices that are chosen for each triangle that is wanted, at least, however many the rim has.
 const LEAST_INSIDE: f64 = 1.0 / 16.0;
+
+/// Edges on the border of what viewers get are at most this many times longer than vertices are apart.
+const RIM_TO_SPACING: f64 = 2.0;
 
 /// One of this many vertices is looked at for the place of the grid.
 const LOOKED_AT: usize = 8;
@@ -73,73 +84,94 @@ const PIECES_TO_SPACING: f64 = 2.0;
 /// enough for the outermost cells.
 const BEYOND_GRID: usize = 200;
 
-/// Simplifies `terrain` to about `triangles` triangles. The result has more if the boundary has too
-/// many edges. Up to half of the vertices inside are those of breaklines, if there are `lines`.
+/// Simplifies `terrain` to about `triangles` triangles for viewers. Up to half of the vertices are those of breaklines, if there are `lines`.
 ///
 /// # Errors
-/// [`sys::Error::Broken`] if the boundary is not that of a part of a Delaunay triangulation, [`sys::Error::Interrupted`].
+/// [`sys::Error::Broken`] if the outline is not that of a part of a Delaunay triangulation, [`sys::Error::Interrupted`].
 pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Option<&Breaklines>) -> Result<Simplified> {
-    let boundary = Boundary::of(terrain);
+    let outline = Outline::of(terrain);
     let positions = terrain.positions;
-    let inside = positions.len() - boundary.vertices;
+    let bounds = most_of(positions).unwrap_or(Bounds::of_point([0; 2]));
+    let mut kept = outline.rim(positions, RIM_TO_SPACING * side_of(bounds, triangles / 2));
+    let on_rim = count(&kept);
     let least = (triangles as f64 * LEAST_INSIDE) as usize;
-    let wanted = (triangles / 2).saturating_sub(boundary.vertices / 2).max(least).min(inside);
-    if wanted >= inside {
-        let vertices = (0..positions.len() as u32).collect();
-        let mesh = CoarseMesh { vertices, positions: positions.to_vec(), triangles: terrain.triangles.to_vec() };
-        return Ok(Simplified { mesh, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 });
+    let wanted = (triangles / 2).saturating_sub(on_rim / 2).max(least).min(positions.len() - on_rim);
+    if on_rim + wanted >= positions.len() {
+        return Ok(Simplified::unchanged(terrain));
     }
     let [xy, up] = frame.resolution_metres();
-    let mut kept = boundary.on.clone();
-    let bounds = most_of(positions).unwrap_or(Bounds::of_point([0; 2]));
     let longest = PIECES_TO_SPACING * side_of(bounds, wanted);
-    let kept_lines = KeptLines::choose(lines, positions, &boundary.on, wanted / 2, longest);
+    let kept_lines = KeptLines::choose(lines, positions, &kept, wanted / 2, longest);
     kept_lines.vertices.iter().for_each(|&v| kept[v] = true);
     let by_grid = ((wanted - kept_lines.vertices.len()) as f64 * BY_GRID) as usize;
     keep_by_grid(positions, bounds, by_grid, &kept_lines, &mut kept);
     interrupt::check()?;
-    let mut filling = Filling::new(positions, &kept, &boundary.edges)?;
+    let mut filling = Filling::new(positions, &kept)?;
     let mut places = Places::new(positions, &filling);
-    let all = boundary.vertices + wanted;
-    refine(positions, &mut kept, |v| kept_lines.allows(v), &mut filling, &mut places, all)?;
-    let mut fixed = boundary.on.clone();
+    refine(positions, &mut kept, |v| kept_lines.allows(v), &mut filling, &mut places, on_rim + wanted)?;
+    let side = side_of(bounds, filling.vertices.len());
+    let mut fixed = vec![false; positions.len()];
     kept_lines.vertices.iter().for_each(|&v| fixed[v] = true);
-    let side = side_of(bounds, filling.vertices.len() - boundary.vertices);
-    let typical_error = fit(positions, |v| fixed[v as usize], &mut filling, &mut places)? * up;
-    let mesh = filling.into_coarse();
+    let typical_error = fit(positions, |v| fixed[v as usize], &mut filling, &mut places)?;
     interrupt::check()?;
-    let greatest_error = vertical_error(positions, terrain.triangles, &mesh) * up;
-    Ok(Simplified { mesh, greatest_error, typical_error, spacing: side * xy })
+    let shown = match places.locate_all(&filling) {
+        places if places.len() == positions.len() => {
+            let covers = covering(positions, &outline, &filling, places);
+            Some(shown(positions, &outline, &filling, &covers, typical_error))
+        }
+        // Nearly all triangles are slivers.
+        _ => None,
+    };
+    let exact = with_outline(positions, kept, &outline, filling, &mut places)?;
+    let shown = shown.unwrap_or_else(|| ShownMesh::without_skirts(exact.clone()));
+    interrupt::check()?;
+    let greatest_error = vertical_error(positions, terrain.triangles, &outline.edges, [&shown.mesh, &exact]) * up;
+    Ok(Simplified { shown, exact, greatest_error, typical_error: typical_error * up, spacing: side * xy })
 }
 
-/// The edges around a terrain.
-struct Boundary {
-    /// The directed edges with the terrain on their left and nothing on their right.
-    edges: Vec<[u32; 2]>,
-    /// Tells whether a vertex is on one of them.
-    on: Vec<bool>,
-    /// The number of vertices on them.
-    vertices: usize,
-}
-
-impl Boundary {
-    fn of(terrain: &Terrain) -> Boundary {
-        let sides_of = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
-        let sides: Vec<[u32; 2]> = match terrain.may_be_on_boundary {
-            Some(NearBoundary { vertices, triangles }) => {
-                let sides = triangles.iter().flat_map(|&t| sides_of(&terrain.triangles[t as usize]));
-                sides.filter(|side| side.iter().all(|&v| vertices[v as usize])).collect()
-            }
-            None => terrain.triangles.iter().flat_map(sides_of).collect(),
-        };
-        let mut known = sides.clone();
-        known.sort_unstable();
-        let edges: Vec<_> = sides.into_iter().filter(|&[a, b]| known.binary_search(&[b, a]).is_err()).collect();
-        let mut on = vec![false; terrain.positions.len()];
-        edges.as_flattened().iter().for_each(|&v| on[v as usize] = true);
-        let vertices = on.iter().filter(|&&on| on).count();
-        Boundary { edges, on, vertices }
+impl Simplified {
+    /// Returns the terrain as it is.
+    fn unchanged(terrain: &Terrain) -> Simplified {
+        let vertices = (0..terrain.positions.len() as u32).collect();
+        let (positions, triangles) = (terrain.positions.to_vec(), terrain.triangles.to_vec());
+        let exact = CoarseMesh { vertices, positions, triangles };
+        let shown = ShownMesh::without_skirts(exact.clone());
+        Simplified { shown, exact, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 }
     }
+}
+
+/// Takes all vertices on the `outline` of the terrain at `positions` into `filling`, with their own heights; it has those that are `kept`.
+/// Returns the triangles within the outline.
+fn with_outline(
+    positions: &[[i32; 3]],
+    mut kept: Vec<bool>,
+    outline: &Outline,
+    mut filling: Filling,
+    places: &mut Places,
+) -> Result<CoarseMesh> {
+    // Rings lead from place to place, so vertices that follow each other are near each other.
+    for &v in outline.rings.iter().flatten() {
+        if !std::mem::replace(&mut kept[v as usize], true) {
+            places.insert(v, &mut filling);
+        }
+    }
+    if filling.vertices.len() < count(&kept) {
+        // Walks to the places took too long.
+        filling = filling.again_with(&kept)?;
+    }
+    for (position, &v) in filling.positions.iter_mut().zip(&filling.vertices) {
+        if outline.on[v as usize] {
+            *position = positions[v as usize];
+        }
+    }
+    let within = filling.within(&outline.edges)?;
+    let (mesh, _) = filling.coarse(&within);
+    filling.recycle();
+    Ok(mesh)
+}
+
+fn count(marked: &[bool]) -> usize {
+    marked.iter().filter(|&&is_marked| is_marked).count()
 }
 
 /// Keeps one vertex of `positions` in each cell of a grid with about `cells` cells within `bounds`: the one nearest to the middle of the

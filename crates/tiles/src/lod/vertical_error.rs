@@ -26,43 +26,64 @@ const MEASURED_FIRST: usize = 1024;
 /// What rounding loses of the range of heights, and more.
 const LOST: f64 = 1.0 / (1u64 << 48) as f64;
 
-/// Returns the greatest vertical distance in steps of z between two terrains. It is never too small. The triangles `fine` are between
-/// `positions` (lattice x, y, z), and those of `coarse` between some of them, with other heights within the same range. Both terrains
-/// must cover the same ground once, with counterclockwise triangles.
-pub fn vertical_error(positions: &[[i32; 3]], fine: &[[u32; 3]], coarse: &CoarseMesh) -> f64 {
+/// Returns the greatest vertical distance in steps of z between a terrain and those of the simplified ones in `coarse`. It is never too small.
+/// The triangles `fine` are between `positions` (lattice x, y, z), counterclockwise, and cover their ground, which has this `outline`, once.
+/// The triangles of the simplified ones are between some of these vertices, with other heights, and cover at least the same ground.
+pub fn vertical_error<'a>(
+    positions: &[[i32; 3]],
+    fine: &[[u32; 3]],
+    outline: &[[u32; 2]],
+    coarse: impl IntoIterator<Item = &'a CoarseMesh>,
+) -> f64 {
     let heights = HeightBounds::new(positions, fine);
-    let corners = |triangle: &[u32; 3]| triangle.map(|v| coarse.positions[v as usize]);
-    let mut bounds: Vec<(u32, u32)> =
-        coarse.triangles.iter().map(|t| heights.error_bound(&corners(t))).zip(0..).collect();
-    // Triangles that may have the greatest error come first, so that most of the others can be skipped.
-    let first = MEASURED_FIRST.min(bounds.len());
-    if first < bounds.len() {
-        bounds.select_nth_unstable_by(first, |a, b| b.cmp(a));
-    }
-    let mut steps = StepsLeft::new(coarse.triangles.len());
-    let mut greatest = 0.0f64;
-    let (first, others) = bounds.split_at(first);
-    for bounds in [first, others] {
-        let mut measured: Vec<_> = bounds.iter().filter(|(bound, _)| *bound as f64 > greatest).copied().collect();
-        if measured.is_empty() {
-            continue;
-        }
-        measured.sort_unstable_by(|a, b| b.cmp(a));
-        let triangles = || measured.iter().map(|(_, triangle)| coarse.triangles[*triangle as usize]);
-        let near = NearTerrain::new(&heights, positions, fine, triangles().map(|t| corners(&t)));
-        for ((bound, _), triangle) in measured.iter().zip(triangles()) {
-            if *bound as f64 > greatest {
-                match near.error_of(triangle.map(|v| coarse.vertices[v as usize]), &corners(&triangle), &mut steps) {
-                    Some(error) => greatest = greatest.max(error),
-                    None => return heights.height_range(),
-                }
-            }
-        }
-    }
+    let fine = FineTerrain { heights: &heights, positions, triangles: fine, outline };
+    let Some(greatest) = coarse.into_iter().try_fold(0.0, |greatest, mesh| fine.error_of(mesh, greatest)) else {
+        return heights.height_range();
+    };
     // Rounding loses about 2^-50 of a height.
     let range = heights.height_range();
     let lost = 1e-9 + range * LOST;
     if greatest > 0.0 { (greatest + lost).min(range.max(greatest)) } else { 0.0 }
+}
+
+/// The terrain before it was simplified.
+struct FineTerrain<'a> {
+    heights: &'a HeightBounds,
+    positions: &'a [[i32; 3]],
+    triangles: &'a [[u32; 3]],
+    outline: &'a [[u32; 2]],
+}
+
+impl FineTerrain<'_> {
+    /// Returns the greatest distance to a simplified terrain, or `greatest` if that is more. `None` if that takes too long.
+    fn error_of(&self, coarse: &CoarseMesh, mut greatest: f64) -> Option<f64> {
+        let corners = |triangle: &[u32; 3]| triangle.map(|v| coarse.positions[v as usize]);
+        let mut bounds: Vec<(u32, u32)> =
+            coarse.triangles.iter().map(|t| self.heights.error_bound(&corners(t))).zip(0..).collect();
+        // Triangles that may have the greatest error come first, so that most of the others can be skipped.
+        let first = MEASURED_FIRST.min(bounds.len());
+        if first < bounds.len() {
+            bounds.select_nth_unstable_by(first, |a, b| b.cmp(a));
+        }
+        let mut steps = StepsLeft::new(coarse.triangles.len());
+        let (first, others) = bounds.split_at(first);
+        for bounds in [first, others] {
+            let mut measured: Vec<_> = bounds.iter().filter(|(bound, _)| *bound as f64 > greatest).copied().collect();
+            if measured.is_empty() {
+                continue;
+            }
+            measured.sort_unstable_by(|a, b| b.cmp(a));
+            let triangles = || measured.iter().map(|(_, triangle)| coarse.triangles[*triangle as usize]);
+            let near = NearTerrain::new(self, triangles().map(|t| corners(&t)));
+            for ((bound, _), triangle) in measured.iter().zip(triangles()) {
+                if *bound as f64 > greatest {
+                    let vertices = triangle.map(|v| coarse.vertices[v as usize]);
+                    greatest = greatest.max(near.error_of(vertices, &corners(&triangle), &mut steps)?);
+                }
+            }
+        }
+        Some(greatest)
+    }
 }
 
 /// How much work is left before a rougher bound must do.
@@ -86,14 +107,12 @@ struct NearTerrain<'a> {
 }
 
 impl<'a> NearTerrain<'a> {
-    fn new(
-        heights: &HeightBounds,
-        positions: &'a [[i32; 3]],
-        fine: &[[u32; 3]],
-        measured: impl Iterator<Item = [[i32; 3]; 3]>,
-    ) -> NearTerrain<'a> {
-        let (vertices, triangles) = heights.near(positions, fine, measured);
-        NearTerrain { mesh: FineMesh::new(positions, &triangles), vertices: VertexCells::new(positions, &vertices) }
+    fn new(fine: &FineTerrain<'a>, measured: impl Iterator<Item = [[i32; 3]; 3]>) -> NearTerrain<'a> {
+        let (vertices, triangles) = fine.heights.near(fine.positions, fine.triangles, measured);
+        NearTerrain {
+            mesh: FineMesh::new(fine.positions, &triangles, fine.outline),
+            vertices: VertexCells::new(fine.positions, &vertices),
+        }
     }
 
     /// Returns the greatest distance between the terrain and a simplified triangle between these vertices, whose `corners` may have other
@@ -105,10 +124,11 @@ impl<'a> NearTerrain<'a> {
     }
 }
 
-/// The terrain before it was simplified.
+/// The triangles of the terrain that are near those that are measured.
 struct FineMesh<'a> {
     positions: &'a [[i32; 3]],
     adjacency: VertexAdjacency,
+    outline: &'a [[u32; 2]],
 }
 
 /// The place that a walk has come to.
@@ -120,8 +140,8 @@ enum WalkPosition {
 }
 
 impl<'a> FineMesh<'a> {
-    fn new(positions: &'a [[i32; 3]], triangles: &[[u32; 3]]) -> FineMesh<'a> {
-        FineMesh { positions, adjacency: VertexAdjacency::new(positions.len(), triangles) }
+    fn new(positions: &'a [[i32; 3]], triangles: &[[u32; 3]], outline: &'a [[u32; 2]]) -> FineMesh<'a> {
+        FineMesh { positions, adjacency: VertexAdjacency::new(positions.len(), triangles), outline }
     }
 
     /// Returns the third corner of the triangle with the directed edge ab.
@@ -135,11 +155,11 @@ impl<'a> FineMesh<'a> {
     }
 
     /// Returns the greatest distance where an edge of a coarse triangle crosses an edge of this mesh. `None` if that takes more than
-    /// `steps`, or if the edge leaves the mesh.
+    /// `steps`.
     fn error_at_crossings(&self, vertices: [u32; 3], corners: &[[i32; 3]; 3], steps: &mut u64) -> Option<f64> {
         let mut greatest = 0.0f64;
         for [i, j] in [[0, 1], [1, 2], [2, 0]] {
-            // The other triangle at an edge has it in the other direction; the boundary is the same in both meshes.
+            // The other triangle at an edge has it in the other direction. If there is none, no edge of this mesh crosses it.
             if vertices[i] < vertices[j] {
                 let edge = CoarseEdge { from: corners[i], to: corners[j] };
                 greatest = greatest.max(self.error_along(vertices[i], vertices[j], &edge, steps)?);
@@ -157,12 +177,17 @@ impl<'a> FineMesh<'a> {
             *steps = steps.checked_sub(self.steps_around(v))?;
             at = match at {
                 WalkPosition::Vertex(v) if v == to => return Some(greatest),
-                WalkPosition::Vertex(v) => self.leave_vertex(v, to, edge)?,
+                WalkPosition::Vertex(v) => match self.leave_vertex(v, to, edge) {
+                    Some(next) => next,
+                    None => self.enter(edge, edge.share_at_vertex(self.positions[v as usize]), steps)?,
+                },
                 WalkPosition::Edge(right, left) => {
                     let [r, l] = [right, left].map(|v| self.positions[v as usize]);
                     greatest = greatest.max(edge.distance_to_edge(r, l));
-                    let next = self.third(left, right)?;
-                    self.leave_edge(right, left, next, edge)
+                    match self.third(left, right) {
+                        Some(next) => self.leave_edge(right, left, next, edge),
+                        None => self.enter(edge, edge.share_at_edge(r, l), steps)?,
+                    }
                 }
             };
             // The ends are among the vertices in the triangle.
@@ -172,6 +197,24 @@ impl<'a> FineMesh<'a> {
                 greatest = greatest.max(edge.distance_to_vertex(self.positions[v as usize]));
             }
         }
+    }
+
+    /// Returns where the way next meets the outline, from outside, after this `share` of it. `None` if it does not, or if that takes more than
+    /// `steps`.
+    fn enter(&self, way: &CoarseEdge, share: f64, steps: &mut u64) -> Option<WalkPosition> {
+        *steps = steps.checked_sub(self.outline.len() as u64 / TRIANGLES_PER_STEP)?;
+        let meeting = |&[from, to]: &[u32; 2]| {
+            let [left, right] = [from, to].map(|v| self.positions[v as usize]);
+            match (way.side(left), way.side(right)) {
+                (0, _) => Some((way.share_at_vertex(left), WalkPosition::Vertex(from))),
+                (of_left, of_right) if of_left > 0 && of_right < 0 => {
+                    Some((way.share_at_edge(right, left), WalkPosition::Edge(to, from)))
+                }
+                _ => None,
+            }
+        };
+        let ahead = self.outline.iter().filter_map(meeting).filter(|(at, _)| *at > share && *at <= 1.0);
+        ahead.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, position)| position)
     }
 
     /// Walks from vertex `v` towards vertex `to`.
@@ -227,10 +270,7 @@ impl CoarseEdge {
 
     /// Returns the vertical distance to a vertex over or under the edge.
     fn distance_to_vertex(&self, point: [i32; 3]) -> f64 {
-        let difference = |k: usize, p: [i32; 3]| p[k] as f64 - self.from[k] as f64;
-        let longer = if difference(0, self.to).abs() >= difference(1, self.to).abs() { 0 } else { 1 };
-        let share = difference(longer, point) / difference(longer, self.to);
-        (difference(2, self.to) * share - difference(2, point)).abs()
+        (self.height(self.share_at_vertex(point)) - (point[2] as f64 - self.from[2] as f64)).abs()
     }
 
     /// Returns the vertical distance to a fine edge where the two cross.
@@ -238,10 +278,26 @@ impl CoarseEdge {
         let (to_right, to_left) = (-self.side(right) as f64, self.side(left) as f64);
         let height = |p: [i32; 3]| p[2] as f64 - self.from[2] as f64;
         let of_fine = (height(right) * to_left + height(left) * to_right) / (to_left + to_right);
+        (of_fine - self.height(self.share_at_edge(right, left))).abs()
+    }
+
+    /// Returns the part of the edge that is before a point on its line.
+    fn share_at_vertex(&self, point: [i32; 3]) -> f64 {
+        let difference = |k: usize, p: [i32; 3]| p[k] as f64 - self.from[k] as f64;
+        let longer = if difference(0, self.to).abs() >= difference(1, self.to).abs() { 0 } else { 1 };
+        difference(longer, point) / difference(longer, self.to)
+    }
+
+    /// Returns the part of the edge that is before a fine edge that crosses it.
+    fn share_at_edge(&self, right: [i32; 3], left: [i32; 3]) -> f64 {
         let start = orient2d(plane(right), plane(left), plane(self.from)) as f64;
         let end = -orient2d(plane(right), plane(left), plane(self.to)) as f64;
-        let of_coarse = height(self.to) * (start / (start + end));
-        (of_fine - of_coarse).abs()
+        start / (start + end)
+    }
+
+    /// Returns the height above the start after this share of the edge.
+    fn height(&self, share: f64) -> f64 {
+        (self.to[2] as f64 - self.from[2] as f64) * share
     }
 }
 

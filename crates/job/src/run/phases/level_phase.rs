@@ -76,7 +76,8 @@ pub(crate) fn make_levels(
     let known: Vec<MadeLevel> = known.into_iter().flat_map(|done| done.figures).collect();
     let is_known: HashSet<NodeIndex> = known.iter().map(|made| made.node).collect();
     let stage = job.progress.stage("levels", (hierarchy.tiles.len() - is_known.len()) as u64, "tiles");
-    let context = LevelContext { directory, store, hierarchy, style, sizes, meshes: output.levels, part, top_of };
+    let (meshes, keeps_meshes) = (output.levels, job.plan.options.updates);
+    let context = LevelContext { directory, store, hierarchy, style, sizes, meshes, part, top_of, keeps_meshes };
     let make = |index: usize| {
         interrupt::check()?;
         let (stats, files) = make_level(&context, index)?;

@@ -124,7 +124,7 @@ pub(crate) fn forget_outdated_levels(
             let names: HashSet<PathBuf> = gone.iter().map(name).collect();
             done.figures.retain(is_whole);
             entry.files.retain(|file| !names.contains(&file.name));
-            let is_of_gone = |key: StepRecord| matches!(key, StepRecord::Level(node) if gone.contains(&node));
+            let is_of_gone = |key: StepRecord| matches!(key, StepRecord::Level(node) | StepRecord::LevelMesh(node) if gone.contains(&node));
             entry.changes.written.retain(|record| !is_of_gone(record.key()));
             entry = entry.with_figures(&done)?;
             outdated.extend(names);

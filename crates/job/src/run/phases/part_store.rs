@@ -14,7 +14,7 @@ use sys::{Error, Result};
 
 /// A part whose records can be read.
 pub(crate) struct OpenPart {
-    pub(crate) store: Store,
+    pub(crate) store: Arc<Store>,
     pub(crate) partition: Partition,
     /// What is written of its tiles.
     pub(crate) tiles: SomeTiles,
@@ -49,7 +49,7 @@ impl PartStores {
         if !entries.iter().any(|entry| entry.step == JobStep::Mesh) {
             return Err(Error::Broken(format!("part {part} is not meshed")));
         }
-        let store = open_store(&directory, records_of(&entries).into_values())?;
+        let store = Arc::new(open_store(&directory, records_of(&entries).into_values())?);
         let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, tiles: tiles_so_far(&entries)?, store });
         open.push_back((part, opened.clone()));
         if open.len() > KEPT_OPEN {
