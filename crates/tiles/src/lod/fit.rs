@@ -24,33 +24,60 @@ pub(crate) fn fit(
     let mut error = 0.0;
     let mut heights: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
     for _ in 0..ROUNDS {
-        interrupt::check()?;
-        // For every vertex the sum of the weights, and that of the distances times their weights.
-        let mut sums = vec![[0.0; 2]; heights.len()];
-        let mut total = 0.0;
-        for (&triangle, &p) in located.iter().zip(positions) {
-            let corners = filling.corners(triangle as usize);
-            let weights = weights(corners.map(|site| plane(filling.positions[site as usize])), plane(p));
-            let height: f64 = corners.iter().zip(weights).map(|(&site, weight)| weight * heights[site as usize]).sum();
-            let distance = f64::from(p[2]) - height;
-            total += distance.abs();
-            for (&site, weight) in corners.iter().zip(weights) {
-                let [of_weights, of_distances] = &mut sums[site as usize];
-                *of_weights += weight;
-                *of_distances += weight * distance;
-            }
-        }
-        for ((height, [of_weights, of_distances]), &v) in heights.iter_mut().zip(&sums).zip(&filling.vertices) {
-            if *of_weights > 0.0 && !fixed(v) {
-                *height += of_distances / of_weights;
-            }
-        }
-        error = total / located.len().max(1) as f64;
+        error = improve(positions, &fixed, filling, located, &mut heights)?;
     }
+    let rounded = rounded(positions, &heights);
+    filling.positions.iter_mut().zip(rounded).for_each(|(p, height)| p[2] = height);
+    Ok(error)
+}
+
+/// Returns `heights` as steps of z, all within the range of the terrain at `positions`.
+fn rounded(positions: &[[i32; 3]], heights: &[f64]) -> impl Iterator<Item = i32> {
     let of_terrain = positions.iter().map(|p| p[2]);
     let [low, high] = [of_terrain.clone().min().unwrap_or(0), of_terrain.max().unwrap_or(0)];
-    filling.positions.iter_mut().zip(&heights).for_each(|(p, height)| p[2] = (height.round() as i32).clamp(low, high));
-    Ok(error)
+    heights.iter().map(move |height| (height.round() as i32).clamp(low, high))
+}
+
+/// Moves the `heights` of `filling` once. `located` has the triangle around each of `positions`. Returns the mean of the distances before.
+///
+/// # Errors
+/// [`sys::Error::Interrupted`].
+pub(crate) fn improve(
+    positions: &[[i32; 3]],
+    fixed: impl Fn(u32) -> bool,
+    filling: &Filling,
+    located: &[u32],
+    heights: &mut [f64],
+) -> Result<f64> {
+    interrupt::check()?;
+    // For every vertex the sum of the weights, and that of the distances times their weights.
+    let mut sums = vec![[0.0; 2]; heights.len()];
+    let mut total = 0.0;
+    for (&triangle, &p) in located.iter().zip(positions) {
+        let corners = filling.corners(triangle as usize);
+        let weights = weights(corners.map(|site| plane(filling.positions[site as usize])), plane(p));
+        let height: f64 = corners.iter().zip(weights).map(|(&site, weight)| weight * heights[site as usize]).sum();
+        let distance = f64::from(p[2]) - height;
+        total += distance.abs();
+        for (&site, weight) in corners.iter().zip(weights) {
+            let [of_weights, of_distances] = &mut sums[site as usize];
+            *of_weights += weight;
+            *of_distances += weight * distance;
+        }
+    }
+    for ((height, [of_weights, of_distances]), &v) in heights.iter_mut().zip(&sums).zip(&filling.vertices) {
+        if *of_weights > 0.0 && !fixed(v) {
+            *height += of_distances / of_weights;
+        }
+    }
+    Ok(total / located.len().max(1) as f64)
+}
+
+/// Returns how far a point is above a triangle of `filling`, in steps of z.
+pub(crate) fn distance_above(filling: &Filling, triangle: usize, p: [i32; 3]) -> f64 {
+    let corners = filling.corners(triangle).map(|site| filling.positions[site as usize]);
+    let weights = weights(corners.map(plane), plane(p));
+    f64::from(p[2]) - (0..3).map(|k| weights[k] * f64::from(corners[k][2])).sum::<f64>()
 }
 
 /// Returns the barycentric coordinates of `p` in a triangle.

@@ -3,7 +3,9 @@
 //! skirt that reaches below it: who looks across the outline sees one of the two surfaces or the skirt.
 
 use crate::lod::filling::{CoarseMesh, Filling};
+use crate::lod::fit::{distance_above, improve};
 use crate::lod::outline::Outline;
+use sys::Result;
 
 /// A simplified terrain for viewers.
 #[derive(Debug, Default)]
@@ -30,11 +32,13 @@ pub(crate) fn shown(
     outline: &Outline,
     filling: &Filling,
     covers: &[bool],
+    places: &[u32],
+    fixed: impl Fn(u32) -> bool,
     spare: f64,
-) -> ShownMesh {
+) -> Result<ShownMesh> {
     let mut border = filling.border(covers);
     border.sort_unstable();
-    let reaches = reaches(positions, outline, filling, &border);
+    let reaches = reaches(positions, outline, filling, &border, places);
     let (mut mesh, number) = filling.coarse(covers);
     let heights: Vec<[i32; 2]> =
         filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], spare)).collect();
@@ -46,18 +50,36 @@ pub(crate) fn shown(
         ends.dedup();
         ends
     };
+    let mut fitted: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
+    let mut on_border = vec![false; positions.len()];
     for site in ends_of(&border) {
-        mesh.positions[number[site as usize] as usize][2] = heights[site as usize][1];
+        fitted[site as usize] = f64::from(heights[site as usize][1]);
+        on_border[filling.vertices[site as usize] as usize] = true;
+    }
+    for _ in 0..2 {
+        improve(positions, |v| on_border[v as usize] || fixed(v), filling, places, &mut fitted)?;
+    }
+    for (site, &height) in fitted.iter().enumerate() {
+        if let Some(p) = mesh.positions.get_mut(number[site] as usize) {
+            p[2] = height.round() as i32;
+        }
     }
     let bottoms = ends_of(&hanging).iter().map(|&site| (number[site as usize], heights[site as usize][0])).collect();
     let skirts = hanging.iter().map(|edge| edge.map(|site| number[site as usize])).collect();
-    ShownMesh { mesh, skirts, bottoms }
+    Ok(ShownMesh { mesh, skirts, bottoms })
 }
 
 /// Returns for each site of `filling` how far the outline is above and below the edges of the `border` that end there.
-fn reaches(positions: &[[i32; 3]], outline: &Outline, filling: &Filling, border: &[[u32; 2]]) -> Vec<Reach> {
+fn reaches(
+    positions: &[[i32; 3]],
+    outline: &Outline,
+    filling: &Filling,
+    border: &[[u32; 2]],
+    places: &[u32],
+) -> Vec<Reach> {
     let mut reaches = vec![Reach::default(); filling.positions.len()];
     let site_of = filling.numbers();
+    let above = |v: u32| distance_above(filling, places[v as usize] as usize, positions[v as usize]);
     for ring in &outline.rings {
         let ends: Vec<(usize, u32)> = (0..ring.len())
             .map(|at| (at, site_of[ring[at] as usize]))
@@ -70,15 +92,51 @@ fn reaches(positions: &[[i32; 3]], outline: &Outline, filling: &Filling, border:
             }
             let edge = BorderEdge { ends: [from, to].map(|site| filling.positions[site as usize]) };
             let count = (last + ring.len() - first) % ring.len() + 1;
-            let along = (first..first + count).map(|at| positions[ring[at % ring.len()] as usize]);
-            let reach = along.map(|p| edge.distance(p)).fold(Reach::default(), Reach::with);
-            for site in [from, to] {
-                let of_site = &mut reaches[site as usize];
-                *of_site = of_site.with(reach.above).with(reach.below);
+            let vertices = (first..first + count).map(|at| ring[at % ring.len()]);
+            let offset = |v: u32| Offset { share: edge.share(positions[v as usize]), above: above(v) };
+            let along: Vec<Offset> = vertices.map(offset).collect();
+            let mut ends = [from, to].map(|site| reaches[site as usize]);
+            raise(&mut ends, &along);
+            for (site, reach) in [from, to].into_iter().zip(ends) {
+                reaches[site as usize] = reach;
             }
         }
     }
     reaches
+}
+
+/// Raises the ends of an edge until it is not below the vertices `along` it, and neither of them much more than it takes.
+fn raise(ends: &mut [Reach; 2], along: &[Offset]) {
+    let missing = |ends: &[Reach; 2], offset: &Offset| {
+        offset.above - ends[0].above * (1.0 - offset.share) - ends[1].above * offset.share
+    };
+    for _ in 0..RAISES {
+        for offset in along {
+            let more = missing(ends, offset);
+            if more > 0.0 {
+                let weights = [1.0 - offset.share, offset.share];
+                let square: f64 = weights.iter().map(|weight| weight * weight).sum();
+                ends.iter_mut().zip(weights).for_each(|(end, weight)| end.above += more * weight / square);
+            }
+        }
+    }
+    let more = along.iter().map(|offset| missing(ends, offset)).fold(0.0, f64::max);
+    let lowest = along.iter().map(|offset| offset.above).fold(0.0, f64::min);
+    for end in ends {
+        end.above += more;
+        end.below = end.below.min(lowest);
+    }
+}
+
+/// How often the ends of an edge are raised vertex by vertex, before both are raised by what is left.
+const RAISES: usize = 3;
+
+/// Where a vertex of the outline is along an edge of the border.
+struct Offset {
+    /// The part of the edge that is before the place on it nearest to the vertex in the plane.
+    share: f64,
+    /// How far the vertex is above the simplified terrain, in steps of z.
+    above: f64,
 }
 
 /// An edge of the border, from one lattice point to another.
@@ -87,13 +145,12 @@ struct BorderEdge {
 }
 
 impl BorderEdge {
-    /// Returns how far a point is above the place on the edge that is nearest to it in the plane.
-    fn distance(&self, point: [i32; 3]) -> f64 {
+    /// Returns the part of the edge that is before the place on it nearest to `point`.
+    fn share(&self, point: [i32; 3]) -> f64 {
         let [from, to] = self.ends;
         let along = |p: [i32; 3], axis: usize| f64::from(p[axis]) - f64::from(from[axis]);
         let product = |p: [i32; 3]| along(p, 0) * along(to, 0) + along(p, 1) * along(to, 1);
-        let share = (product(point) / product(to)).clamp(0.0, 1.0);
-        along(point, 2) - share * along(to, 2)
+        (product(point) / product(to)).clamp(0.0, 1.0)
     }
 }
 
@@ -111,9 +168,5 @@ impl Reach {
     fn around(self, height: i32, spare: f64) -> [i32; 2] {
         let fitted = f64::from(height);
         [(fitted + self.below - spare).floor() as i32, (fitted + self.above).ceil() as i32]
-    }
-
-    fn with(self, distance: f64) -> Reach {
-        Reach { above: self.above.max(distance), below: self.below.min(distance) }
     }
 }

@@ -117,7 +117,7 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     let shown = match places.locate_all(&filling) {
         places if places.len() == positions.len() => {
             let covers = covering(positions, &outline, &filling, places);
-            Some(shown(positions, &outline, &filling, &covers, typical_error))
+            Some(shown(positions, &outline, &filling, &covers, places, |v| fixed[v as usize], typical_error)?)
         }
         // Nearly all triangles are slivers.
         _ => None,
