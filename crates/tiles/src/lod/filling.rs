@@ -71,11 +71,24 @@ impl<'a> Filling<'a> {
         twins.into_iter().filter(|&twin| twin != HalfEdgeIndex::HULL).map(HalfEdgeIndex::triangle)
     }
 
-    /// Returns the directed edges that have a triangle on the left that is among those that are `shown`, and none on the right.
-    pub(crate) fn border(&self, shown: &[bool]) -> Vec<[u32; 2]> {
+    /// Returns the border of the triangles that are `shown`.
+    pub(crate) fn border(&self, shown: &[bool]) -> Border {
+        let mesh = &self.mesh;
         let is_shown = |h: HalfEdgeIndex| h != HalfEdgeIndex::HULL && shown[h.triangle()];
-        let on_border = self.mesh.half_edges().filter(|&h| is_shown(h) && !is_shown(self.mesh.twin(h)));
-        on_border.map(|h| [self.mesh.origin(h).0, self.mesh.destination(h).0]).collect()
+        let ends_of = |h: HalfEdgeIndex| [mesh.origin(h).0, mesh.destination(h).0];
+        let mut on_border: Vec<HalfEdgeIndex> =
+            mesh.half_edges().filter(|&h| is_shown(h) && !is_shown(mesh.twin(h))).collect();
+        on_border.sort_unstable_by_key(|&h| ends_of(h));
+        let edges: Vec<[u32; 2]> = on_border.iter().map(|&h| ends_of(h)).collect();
+        let mut arriving = Vec::with_capacity(edges.len());
+        for &h in &on_border {
+            let mut last = h.previous();
+            while is_shown(mesh.twin(last)) {
+                last = mesh.twin(last).previous();
+            }
+            arriving.push(edges.partition_point(|edge| *edge < ends_of(last)) as u32);
+        }
+        Border { edges, arriving }
     }
 
     /// Returns the triangle under vertex `v` of the terrain, looking from triangle `start` on; `None` if that takes more than `steps`.
@@ -133,6 +146,14 @@ impl<'a> Filling<'a> {
     pub(crate) fn recycle(self) {
         triangulation::recycle(self.mesh);
     }
+}
+
+/// The edges around some triangles of a [`Filling`].
+pub(crate) struct Border {
+    /// Their ends, sorted. The triangles are on the left.
+    pub(crate) edges: Vec<[u32; 2]>,
+    /// For each edge the number of the one that arrives where it begins, on the other side of the triangles there.
+    pub(crate) arriving: Vec<u32>,
 }
 
 /// A mesh between some vertices of a terrain.

@@ -23,8 +23,9 @@ pub(crate) fn fit(
     let located = places.locate_all(filling);
     let mut error = 0.0;
     let mut heights: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
+    let moves: Vec<bool> = filling.vertices.iter().map(|&v| !fixed(v)).collect();
     for _ in 0..ROUNDS {
-        error = improve(positions, &fixed, filling, located, &mut heights)?;
+        error = improve(positions, &moves, filling, located, &mut heights)?;
     }
     let rounded = rounded(positions, &heights);
     filling.positions.iter_mut().zip(rounded).for_each(|(p, height)| p[2] = height);
@@ -38,13 +39,14 @@ fn rounded(positions: &[[i32; 3]], heights: &[f64]) -> impl Iterator<Item = i32>
     heights.iter().map(move |height| (height.round() as i32).clamp(low, high))
 }
 
-/// Moves the `heights` of `filling` once. `located` has the triangle around each of `positions`. Returns the mean of the distances before.
+/// Moves those `heights` of `filling` once that may move. `located` has the triangle around each of `positions`. Returns the mean of
+/// the distances before, in the triangles with a height that may move.
 ///
 /// # Errors
 /// [`sys::Error::Interrupted`].
 pub(crate) fn improve(
     positions: &[[i32; 3]],
-    fixed: impl Fn(u32) -> bool,
+    moves: &[bool],
     filling: &Filling,
     located: &[u32],
     heights: &mut [f64],
@@ -52,25 +54,29 @@ pub(crate) fn improve(
     interrupt::check()?;
     // For every vertex the sum of the weights, and that of the distances times their weights.
     let mut sums = vec![[0.0; 2]; heights.len()];
-    let mut total = 0.0;
+    let (mut total, mut count) = (0.0, 0);
     for (&triangle, &p) in located.iter().zip(positions) {
         let corners = filling.corners(triangle as usize);
+        if !corners.iter().any(|&site| moves[site as usize]) {
+            continue;
+        }
         let weights = weights(corners.map(|site| plane(filling.positions[site as usize])), plane(p));
         let height: f64 = corners.iter().zip(weights).map(|(&site, weight)| weight * heights[site as usize]).sum();
         let distance = f64::from(p[2]) - height;
         total += distance.abs();
+        count += 1;
         for (&site, weight) in corners.iter().zip(weights) {
             let [of_weights, of_distances] = &mut sums[site as usize];
             *of_weights += weight;
             *of_distances += weight * distance;
         }
     }
-    for ((height, [of_weights, of_distances]), &v) in heights.iter_mut().zip(&sums).zip(&filling.vertices) {
-        if *of_weights > 0.0 && !fixed(v) {
+    for ((height, [of_weights, of_distances]), moves) in heights.iter_mut().zip(&sums).zip(moves) {
+        if *of_weights > 0.0 && *moves {
             *height += of_distances / of_weights;
         }
     }
-    Ok(total / located.len().max(1) as f64)
+    Ok(total / f64::from(count.max(1)))
 }
 
 /// Returns how far a point is above a triangle of `filling`, in steps of z.

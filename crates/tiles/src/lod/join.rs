@@ -216,9 +216,9 @@ impl Joined {
         tile.colors.iter_mut().for_each(|all| repeat(all, &tops));
         let attributes = tile.attributes.clone();
         tops.iter().for_each(|&top| tile.attributes.push_from(&attributes, top as usize));
-        let below = |top: u32| first + tops.partition_point(|other| *other < top) as u32;
-        for [from, to] in shown.skirts {
-            tile.triangles.extend([[below(from), below(to), to], [below(from), to, from]]);
+        for [start, end] in shown.skirts {
+            let [from, to] = [start, end].map(|bottom| tops[bottom as usize]);
+            tile.triangles.extend([[first + start, first + end, to], [first + start, to, from]]);
         }
         tile
     }

@@ -2,7 +2,7 @@
 //! another way. So that no gap is seen between the two, it covers all of the terrain (`covering.rs`), is nowhere below the outline, and has a
 //! skirt that reaches below it: who looks across the outline sees one of the two surfaces or the skirt.
 
-use crate::lod::filling::{CoarseMesh, Filling};
+use crate::lod::filling::{Border, CoarseMesh, Filling};
 use crate::lod::fit::{distance_above, improve};
 use crate::lod::outline::Outline;
 use sys::Result;
@@ -12,10 +12,10 @@ use sys::Result;
 pub struct ShownMesh {
     /// Its triangles.
     pub mesh: CoarseMesh,
-    /// The directed edges around it with vertical triangles below them. The terrain is on their left.
-    pub skirts: Vec<[u32; 2]>,
-    /// The lower ends of these triangles: vertices of `mesh`, ascending, each with a height on the lattice.
+    /// The vertices below its border: the vertex of `mesh` above, and the height on the lattice.
     pub bottoms: Vec<(u32, i32)>,
+    /// The edges between two of them, which lead around the mesh: it is on their left.
+    pub skirts: Vec<[u32; 2]>,
 }
 
 impl ShownMesh {
@@ -36,37 +36,61 @@ pub(crate) fn shown(
     fixed: impl Fn(u32) -> bool,
     spare: f64,
 ) -> Result<ShownMesh> {
-    let mut border = filling.border(covers);
-    border.sort_unstable();
-    let reaches = reaches(positions, outline, filling, &border, places);
+    let border = filling.border(covers);
+    let reaches = reaches(positions, outline, filling, &border.edges, places);
     let (mut mesh, number) = filling.coarse(covers);
     let heights: Vec<[i32; 2]> =
         filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], spare)).collect();
-    let has_height = |edge: &&[u32; 2]| edge.iter().any(|&site| heights[site as usize][0] < heights[site as usize][1]);
-    let hanging: Vec<[u32; 2]> = border.iter().filter(has_height).copied().collect();
-    let ends_of = |edges: &[[u32; 2]]| {
-        let mut ends = edges.as_flattened().to_vec();
-        ends.sort_unstable_by_key(|&site| number[site as usize]);
-        ends.dedup();
-        ends
-    };
     let mut fitted: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
-    let mut on_border = vec![false; positions.len()];
-    for site in ends_of(&border) {
+    let mut is_on_border = vec![false; fitted.len()];
+    for &[site, _] in &border.edges {
         fitted[site as usize] = f64::from(heights[site as usize][1]);
-        on_border[filling.vertices[site as usize] as usize] = true;
+        is_on_border[site as usize] = true;
     }
-    for _ in 0..2 {
-        improve(positions, |v| on_border[v as usize] || fixed(v), filling, places, &mut fitted)?;
+    let moves = beside(filling, &is_on_border, |site| !fixed(filling.vertices[site as usize]));
+    for _ in 0..ROUNDS {
+        improve(positions, &moves, filling, places, &mut fitted)?;
     }
     for (site, &height) in fitted.iter().enumerate() {
-        if let Some(p) = mesh.positions.get_mut(number[site] as usize) {
-            p[2] = height.round() as i32;
+        if let Some(position) = mesh.positions.get_mut(number[site] as usize) {
+            position[2] = height.round() as i32;
         }
     }
-    let bottoms = ends_of(&hanging).iter().map(|&site| (number[site as usize], heights[site as usize][0])).collect();
-    let skirts = hanging.iter().map(|edge| edge.map(|site| number[site as usize])).collect();
-    Ok(ShownMesh { mesh, skirts, bottoms })
+    let bottoms = border.edges.iter().map(|&[site, _]| (number[site as usize], heights[site as usize][0])).collect();
+    Ok(ShownMesh { mesh, bottoms, skirts: chained(&border) })
+}
+
+/// How often the heights beside the border move after it was raised.
+const ROUNDS: usize = 2;
+
+/// Tells for each site of `filling` whether it may move, and shares a triangle with one on the border without being on it.
+fn beside(filling: &Filling, is_on_border: &[bool], may_move: impl Fn(u32) -> bool) -> Vec<bool> {
+    let mut beside = vec![false; is_on_border.len()];
+    for corners in (0..filling.triangles()).map(|triangle| filling.corners(triangle)) {
+        if corners.iter().any(|&site| is_on_border[site as usize]) {
+            let inner = corners.into_iter().filter(|&site| !is_on_border[site as usize] && may_move(site));
+            inner.for_each(|site| beside[site as usize] = true);
+        }
+    }
+    beside
+}
+
+/// Returns for each edge of a border the number of the vertex below its start and that of the one below its end. The first is the number
+/// of the edge. Where parts of the border meet at a site, each part ends at the vertex from which the next one goes on: so all triangles
+/// around the site make one ring.
+fn chained(border: &Border) -> Vec<[u32; 2]> {
+    let Border { edges, arriving } = border;
+    let mut skirts = vec![[0; 2]; edges.len()];
+    let mut first = 0;
+    for leaving in edges.chunk_by(|a, b| a[0] == b[0]) {
+        for k in 0..leaving.len() {
+            let next = first + (k + 1) % leaving.len();
+            let before = arriving[first + k] as usize;
+            skirts[before] = [before as u32, next as u32];
+        }
+        first += leaving.len();
+    }
+    skirts
 }
 
 /// Returns for each site of `filling` how far the outline is above and below the edges of the `border` that end there.

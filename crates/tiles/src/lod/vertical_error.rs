@@ -345,7 +345,9 @@ mod tests {
             let coarse = CoarseMesh { positions: kept.iter().map(|&v| moved[v as usize]).collect(), vertices: kept, triangles };
 
             let every_vertex: Vec<u32> = (0..positions.len() as u32).collect();
-            let (mesh, vertices) = (FineMesh::new(&positions, fine.corners()), VertexCells::new(&positions, &every_vertex));
+            let hull: Vec<[u32; 2]> = fine.hull().map(|h| [fine.origin(h).0, fine.destination(h).0]).collect();
+            let mesh = FineMesh::new(&positions, fine.corners(), &hull);
+            let vertices = VertexCells::new(&positions, &every_vertex);
             let whole = NearTerrain { mesh, vertices };
             let mut steps = StepsLeft { of_walks: u64::MAX, of_vertices: u64::MAX };
             let furthest = coarse.triangles.iter().map(|t| {
@@ -353,7 +355,7 @@ mod tests {
                 whole.error_of(t.map(|v| coarse.vertices[v as usize]), &corners, &mut steps).unwrap()
             });
             let furthest = furthest.fold(0.0, f64::max);
-            let found = vertical_error(&positions, fine.corners(), &coarse);
+            let found = vertical_error(&positions, fine.corners(), &hull, [&coarse]);
             let most = furthest + 2e-9;
             prop_assert!(found == 0.0 && furthest == 0.0 || (furthest..most).contains(&found), "{} and {}", found, furthest);
         }

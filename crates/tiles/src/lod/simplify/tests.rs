@@ -1,14 +1,16 @@
-//! Tests that simplified terrains cover the ground of the original and are no further from it than they say.
+//! Tests that simplified terrains cover the ground of the original, hide its outline, and are no further from it than they say.
 
 use proptest::prelude::*;
 
 use crate::frame::Frame;
-use crate::lod::simplify::{Terrain, simplify};
+use crate::lod::join::Joining;
+use crate::lod::simplify::simplify;
 use crate::tile::Tile;
 use breaklines::{BreaklineOptions, Breaklines, Feature, FeatureId, FeatureKind, Vertex};
 use delaunay::geometry::predicates::orient2d;
 use delaunay::triangulation::reference::triangulate;
 use lattice::{Lattice, shortest_decimal};
+use std::collections::HashSet;
 
 /// A frame whose steps are metres.
 fn frame() -> Frame {
@@ -24,11 +26,37 @@ fn terrain(mut points: Vec<[i32; 3]>) -> Tile {
     Tile { triangles: triangulate(&sites).unwrap().corners().to_vec(), positions: points, ..Tile::default() }
 }
 
-/// Simplifies a terrain; returns the result and the greatest error.
-fn simplified(tile: &Tile, triangles: usize, lines: Option<&Breaklines>) -> (Tile, f64) {
-    let terrain = Terrain { positions: &tile.positions, triangles: &tile.triangles, may_be_on_boundary: None };
-    let simple = simplify(&frame(), &terrain, triangles, lines).unwrap();
-    (Tile::of(&simple.mesh.positions, simple.mesh.triangles), simple.greatest_error)
+/// A simplified terrain.
+struct Simple {
+    /// What viewers get, with its skirts.
+    shown: Tile,
+    /// What viewers get, without skirts.
+    surface: Tile,
+    /// The mesh with the whole outline.
+    exact: Tile,
+    greatest_error: f64,
+}
+
+fn simplified(tile: &Tile, triangles: usize, lines: Option<&Breaklines>) -> Simple {
+    let frame = frame();
+    let mut joining = Joining::new(&frame, tile.positions.len());
+    joining.add_mesh(tile.clone());
+    let joined = joining.finish();
+    let simple = simplify(&frame, &joined.terrain(), triangles, lines).unwrap();
+    Simple {
+        surface: Tile::of(&simple.shown.mesh.positions, simple.shown.mesh.triangles.clone()),
+        exact: joined.tile(simple.exact),
+        shown: joined.shown_tile(simple.shown),
+        greatest_error: simple.greatest_error,
+    }
+}
+
+/// Returns the edges around a tile, which is on their left.
+fn outline(tile: &Tile) -> Vec<[[i32; 3]; 2]> {
+    let sides: Vec<[u32; 2]> = tile.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    let known: HashSet<[u32; 2]> = sides.iter().copied().collect();
+    let outer = sides.into_iter().filter(|&[a, b]| !known.contains(&[b, a]));
+    outer.map(|edge| edge.map(|v| tile.positions[v as usize])).collect()
 }
 
 /// Returns twice the area, and asserts that all triangles are counterclockwise.
@@ -53,19 +81,22 @@ fn height(tile: &Tile, place: [f64; 2]) -> Option<f64> {
 }
 
 #[test]
-fn a_plane_keeps_its_boundary_and_has_no_error() {
+fn a_plane_keeps_its_corners_and_has_no_error() {
     let plane = terrain((0..400).map(|i| [i % 20 * 10, i / 20 * 10, i % 20 * 3 + i / 20 * 7]).collect());
-    let (simple, greatest_error) = simplified(&plane, 1, None);
-    assert!(greatest_error < 1e-8, "{greatest_error}");
-    assert_eq!(area(&simple), area(&plane));
+    let simple = simplified(&plane, 1, None);
+    assert!(simple.greatest_error < 1e-8, "{}", simple.greatest_error);
     // The 76 vertices of the boundary, and the triangles between them.
-    assert_eq!((simple.positions.len(), simple.triangles.len()), (76, 74));
+    assert_eq!(area(&simple.exact), area(&plane));
+    assert_eq!((simple.exact.positions.len(), simple.exact.triangles.len()), (76, 74));
+    assert_eq!(area(&simple.surface), area(&plane));
+    assert_eq!((simple.surface.positions.len(), simple.surface.triangles.len()), (4, 2));
 }
 
 #[test]
 fn a_tile_without_inner_vertices_stays_as_it_is() {
     let fan = terrain(vec![[0, 0, 5], [9, 0, 5], [0, 9, 1]]);
-    assert_eq!(simplified(&fan, 1, None), (fan, 0.0));
+    let simple = simplified(&fan, 1, None);
+    assert_eq!((simple.shown, simple.exact, simple.greatest_error), (fan.clone(), fan, 0.0));
 }
 
 /// A field of points every 10 steps with a line through it, as a job makes it: near the line points are dropped.
@@ -94,13 +125,83 @@ fn breaklines_keep_their_vertices_and_stay_edges() {
     let (tile, lines) = field_with_line();
     let all = lines.sites().len();
     assert_eq!(line_in(&tile, &lines), (all, true));
-    let simple = |share: usize| simplified(&tile, tile.triangles.len() / share, Some(&lines)).0;
-    assert_eq!(line_in(&simple(5), &lines), (all, true), "there is room for all");
-    let (some, joined) = line_in(&simple(200), &lines);
-    assert!(joined && (all / 12..all / 2).contains(&some), "{some} of {all}");
-    assert_eq!(area(&simple(200)), area(&tile));
-    let (without, _) = line_in(&simplified(&tile, tile.triangles.len() / 5, None).0, &lines);
+    let simple = |share: usize| simplified(&tile, tile.triangles.len() / share, Some(&lines));
+    for of_simple in [|simple: Simple| simple.exact, |simple: Simple| simple.surface] {
+        assert_eq!(line_in(&of_simple(simple(5)), &lines), (all, true), "there is room for all");
+        let (some, joined) = line_in(&of_simple(simple(200)), &lines);
+        assert!(joined && (all / 12..all / 2).contains(&some), "{some} of {all}");
+    }
+    assert_eq!(area(&simple(200).exact), area(&tile));
+    let (without, _) = line_in(&simplified(&tile, tile.triangles.len() / 5, None).exact, &lines);
     assert!(without < all / 2, "{without}: this test would prove nothing");
+}
+
+/// Returns a square with holes and a ragged outline: the triangles of a lattice with uneven heights whose middle is in a rectangle and not in
+/// one of the `holes` (middle and radius).
+fn ragged(side: i32, holes: &[([i32; 2], i32)], height: impl Fn(i32, i32) -> i32) -> Tile {
+    let jitter = |i: i32, salt: i32| (i.wrapping_mul(7919).wrapping_add(salt) % 17 - 8) / 2;
+    let point = |i: i32| {
+        let [x, y] = [i % side * 10 + jitter(i, 3), i / side * 10 + jitter(i, 11)];
+        [x, y, height(x, y) + jitter(i, 5)]
+    };
+    let all = terrain((0..side * side).map(point).collect());
+    let middle = |t: &[u32; 3]| [0, 1].map(|axis| t.iter().map(|&v| all.positions[v as usize][axis]).sum::<i32>() / 3);
+    let is_inside = |t: &[u32; 3]| {
+        let [x, y] = middle(t);
+        let ends = [40, side * 10 - 50];
+        let in_hole = |&([hx, hy], radius): &([i32; 2], i32)| (x - hx).pow(2) + (y - hy).pow(2) < radius * radius;
+        [x, y].iter().all(|v| (ends[0]..ends[1]).contains(v)) && !holes.iter().any(in_hole)
+    };
+    Tile::of(&all.positions, all.triangles.iter().filter(|t| is_inside(t)).copied().collect())
+}
+
+/// Returns the least that `tile` is above the outline of `original` near a place on it: across the outline, up to its own border.
+fn above_outline(tile: &Tile, [from, to]: [[i32; 3]; 2], share: f64) -> f64 {
+    let at = |k: usize| f64::from(from[k]) + share * f64::from(to[k] - from[k]);
+    height(tile, [at(0), at(1)]).map_or(f64::NEG_INFINITY, |height| height - at(2))
+}
+
+#[test]
+fn what_viewers_get_covers_ragged_terrain_with_few_vertices_and_hides_its_outline() {
+    let hill = |x: i32, y: i32| ((x * x + 3 * y * y) / 700 + (x * y) / 300) % 211;
+    for holes in [vec![], vec![([300, 260], 90)], vec![([200, 200], 60), ([420, 380], 8), ([40, 300], 70)]] {
+        let tile = ragged(64, &holes, hill);
+        let simple = simplified(&tile, tile.triangles.len() / 6, None);
+        let (fine, coarse) = (outline(&tile), outline(&simple.surface));
+        assert!(2 * coarse.len() < fine.len(), "{} of {}", coarse.len(), fine.len());
+        let more = area(&simple.surface) as f64 / area(&tile) as f64;
+        assert!((1.0..1.06).contains(&more), "{more}");
+        for t in &tile.triangles {
+            let corners = t.map(|v| tile.positions[v as usize].map(f64::from));
+            let middle = [0, 1].map(|axis| corners.iter().map(|p| p[axis]).sum::<f64>() / 3.0);
+            assert!(height(&simple.surface, middle).is_some(), "{middle:?} is not covered");
+        }
+        // Nowhere is the border below the outline beside it, but for what the triangles beside it hide.
+        let below = fine.iter().filter(|edge| above_outline(&simple.surface, **edge, 0.0) < -12.0).count();
+        assert!(below <= fine.len() / 50, "{below} of {}", fine.len());
+    }
+}
+
+/// What looks across the border from above sees no gap: the skirts join the border all around, and end below the outline.
+#[test]
+fn skirts_hang_below_the_whole_border() {
+    let tile = ragged(48, &[([200, 200], 60)], |x, y| (x * x + y * y) / 900 % 97);
+    let Simple { shown, surface, .. } = simplified(&tile, tile.triangles.len() / 6, None);
+    let skirts = &shown.triangles[surface.triangles.len()..];
+    let border = outline(&surface);
+    assert_eq!(skirts.len(), 2 * border.len());
+    let place = |v: u32| shown.positions[v as usize];
+    let sites = |t: &[u32; 3]| t.iter().map(|&v| [place(v)[0], place(v)[1]]).collect::<HashSet<_>>();
+    assert!(skirts.iter().all(|t| sites(t).len() == 2), "a skirt is not vertical");
+    // Only the lower ends of the skirts are edges of a single triangle.
+    let lowest = |[x, y, z]: [i32; 3]| shown.positions.iter().any(|p| p[0] == x && p[1] == y && p[2] > z);
+    assert!(outline(&shown).iter().flatten().all(|&p| lowest(p)), "the border has gaps");
+    for edge in outline(&tile) {
+        let [x, y, z] = edge[0];
+        let near = |p: &&[i32; 3]| (p[0] - x).pow(2) + (p[1] - y).pow(2) < 400;
+        let around = shown.positions[surface.positions.len()..].iter().filter(near).map(|p| p[2]).min();
+        assert!(around.is_none_or(|bottom| bottom < z + 20), "{x} {y}");
+    }
 }
 
 proptest! {
@@ -112,19 +213,24 @@ proptest! {
     ) {
         let tile = terrain(points);
         prop_assume!(!tile.triangles.is_empty());
-        let (simple, greatest_error) = simplified(&tile, tile.triangles.len() / share, None);
-        prop_assert_eq!(area(&simple), area(&tile));
-        prop_assert!(simple.triangles.len() <= tile.triangles.len());
+        let Simple { surface, exact, greatest_error, .. } = simplified(&tile, tile.triangles.len() / share, None);
+        prop_assert_eq!(area(&exact), area(&tile));
+        prop_assert!(exact.triangles.len() <= tile.triangles.len());
+        prop_assert_eq!(outline(&exact).into_iter().collect::<HashSet<_>>(), outline(&tile).into_iter().collect());
         let mut greatest = 0.0f64;
         for place in places {
-            if let (Some(fine), Some(coarse)) = (height(&tile, place), height(&simple, place)) {
-                greatest = greatest.max((fine - coarse).abs());
+            if let Some(fine) = height(&tile, place) {
+                for simple in [&surface, &exact] {
+                    let coarse = height(simple, place);
+                    prop_assert!(coarse.is_some(), "{:?} is not covered", place);
+                    greatest = greatest.max((fine - coarse.unwrap()).abs());
+                }
             }
         }
         prop_assert!(greatest <= greatest_error + 1e-9, "{} of {}", greatest, greatest_error);
         // The error is measured, not bounded by the range of all heights.
         let vertices = tile.positions.iter().filter_map(|p| {
-            Some((height(&simple, [p[0] as f64, p[1] as f64])? - p[2] as f64).abs())
+            Some((height(&surface, [p[0] as f64, p[1] as f64])? - p[2] as f64).abs())
         });
         let at_vertices = vertices.fold(0.0, f64::max);
         prop_assert!(greatest_error == 0.0 || greatest_error < 60.0 || at_vertices > 0.0);
