@@ -388,6 +388,8 @@ pub struct TileSummary {
     pub error: f64,
     /// The greatest vertical distance to the exact mesh in metres.
     pub greatest_error: f64,
+    /// The same of the mesh that the tile above it is made from.
+    pub mesh_error: f64,
     /// About the mean vertical distance to the vertices of the exact mesh in metres.
     pub typical_error: f64,
     /// The least and greatest lattice x, y, z of the exact mesh below and of the tile. Without a triangle, the least are greater.
@@ -404,6 +406,7 @@ impl TileSummary {
         TileSummary {
             error: 0.0,
             greatest_error: 0.0,
+            mesh_error: 0.0,
             typical_error: 0.0,
             corners,
             vertices: vertices as u32,

@@ -34,12 +34,18 @@ impl Tile {
 
     /// Returns the tile of these triangles between vertices of this tile.
     pub(crate) fn subset(&self, triangles: Vec<[u32; 3]>) -> Tile {
-        let (tile, vertices) = Tile::with_vertices(&self.positions, triangles);
+        let (Tile { positions, triangles, .. }, vertices) = Tile::with_vertices(&self.positions, triangles);
+        self.with_style_of(&vertices, positions, triangles)
+    }
+
+    /// Returns the tile of these triangles between vertices at other `positions`, each of which is in all else like one of these `vertices`.
+    pub(crate) fn with_style_of(&self, vertices: &[u32], positions: Vec<[i32; 3]>, triangles: Vec<[u32; 3]>) -> Tile {
         Tile {
-            normals: self.normals.as_ref().map(|all| pick(all, &vertices)),
-            colors: self.colors.as_ref().map(|all| pick(all, &vertices)),
-            attributes: self.attributes.pick(&vertices),
-            ..tile
+            positions,
+            normals: self.normals.as_ref().map(|all| pick(all, vertices)),
+            colors: self.colors.as_ref().map(|all| pick(all, vertices)),
+            attributes: self.attributes.pick(vertices),
+            triangles,
         }
     }
 

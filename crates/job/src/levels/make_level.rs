@@ -9,7 +9,7 @@ use crate::partition::tree::{NodeKind, Tree};
 use crate::records::{LevelSummary, StepRecord, Store, TileSummary};
 use crate::tiles::style::TileStyle;
 use crate::tiles::write_tile::write_glb;
-use delaunay::geometry::Bounds;
+use delaunay::geometry::{Bounds, bounds_of};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 use std::path::{Path, PathBuf};
@@ -101,19 +101,21 @@ pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<(LevelS
         match memory_for(&children).filter(|bytes| *bytes <= context.sizes.memory) {
             None => stats.left_out = 1,
             Some(_) => {
-                let Level { shown, exact, simple } = Level::of(context, coarse.node, &children)?;
+                let Level { shown, surface, exact, simple } = Level::of(context, coarse.node, &children)?;
                 let of_children =
                     |error: fn(&TileSummary) -> f64| children.iter().map(|c| error(&c.own)).fold(0.0, f64::max);
-                // No distance is greater than the range of heights: both meshes lie within it.
-                let greatest = of_children(|own| own.greatest_error) + simple.greatest_error;
-                own.greatest_error = greatest.min(height_range(&context.style.frame, bounds));
+                own.include(shown.bounds());
+                // No distance is greater than the range of heights: all meshes lie within it.
+                let range = height_range(&context.style.frame, bounds.union(surface));
+                let of_meshes = of_children(|own| own.mesh_error);
+                own.mesh_error = (of_meshes + simple.exact_error).min(range);
+                own.greatest_error = (of_meshes + simple.shown_error).min(range);
                 // What one level adds to the error has little to do with what the next one adds.
                 let before = of_children(|own| own.typical_error);
                 own.typical_error = (before * before + simple.typical_error * simple.typical_error).sqrt();
                 let seen = seen_error(simple.spacing, own.typical_error, &context.style.frame, bounds);
                 own.error = seen.max(of_children(|own| own.error));
                 own.vertices = exact.positions.len() as u32;
-                own.include(shown.bounds());
                 save_mesh(context.store, coarse.node, &exact)?;
                 let path = context.directory.output().level(context.part.node_number(coarse.node));
                 let written = write_glb(&path, &shown, context.style)?;
@@ -155,6 +157,8 @@ fn memory_for(children: &[Child]) -> Option<u64> {
 struct Level {
     /// What viewers get.
     shown: Tile,
+    /// The box of it without its skirts.
+    surface: Bounds<3>,
     /// What the tile above is made from.
     exact: Tile,
     /// What is known of them, without the meshes.
@@ -178,7 +182,9 @@ impl Level {
         let target = context.sizes.target(terrain.triangles.len());
         let mut simple = simplify(&context.style.frame, &terrain, target, context.style.lines.as_deref())?;
         let (shown, exact) = (std::mem::take(&mut simple.shown), std::mem::take(&mut simple.exact));
-        Ok(Level { shown: joined.shown_tile(shown), exact: joined.tile(exact), simple })
+        let surface = bounds_of(&shown.mesh.positions).ok_or_else(|| contradiction(node, &"nothing is left"))?;
+        let [shown, exact] = joined.tiles(shown, exact);
+        Ok(Level { shown, surface, exact, simple })
     }
 }
 

@@ -98,13 +98,13 @@ impl<'a> Filling<'a> {
 
     /// Takes in vertex `v`, which the mesh does not have, and looks for its place from triangle `start` on. It leaves the vertex out if
     /// that takes more than `steps`.
-    pub(crate) fn insert(&mut self, v: u32, start: usize, steps: &mut u64) {
+    pub(crate) fn insert(&mut self, v: u32, start: usize, steps: &mut u64, note: impl FnMut(usize)) {
         let Some(triangle) = self.locate(v, start, steps) else { return };
         let position = self.terrain[v as usize];
         self.vertices.push(v);
         self.positions.push(position);
         self.sites.push(plane(position));
-        insert(&mut self.mesh, &self.sites, SiteIndex::new(self.sites.len() - 1), triangle, |_| {});
+        insert(&mut self.mesh, &self.sites, SiteIndex::new(self.sites.len() - 1), triangle, note);
     }
 
     /// Marks the triangles on the left of the directed edges `outline` between vertices of the terrain.

@@ -198,29 +198,28 @@ impl Joined {
         Terrain { positions: &self.positions, triangles: &self.triangles, may_be_on_boundary: Some(near) }
     }
 
-    /// Returns the tile of a mesh between some of the vertices. It has normals if all tiles have them, and likewise colours and attributes.
-    pub fn tile(&self, mesh: CoarseMesh) -> Tile {
-        let CoarseMesh { vertices, positions, triangles } = mesh;
-        self.dressed(Tile { positions, triangles, ..Tile::default() }, &vertices)
-    }
-
-    /// Returns the tile of what viewers get, as [`Joined::tile`] does.
-    pub fn shown_tile(&self, shown: ShownMesh) -> Tile {
-        let mut tile = self.tile(shown.mesh);
-        let first = tile.positions.len() as u32;
+    /// Returns the tiles of two meshes between some of the vertices: what viewers get, and the `exact` one, which has all of its vertices.
+    /// They have normals if all tiles have them, and likewise colours and attributes.
+    pub fn tiles(&self, shown: ShownMesh, exact: CoarseMesh) -> [Tile; 2] {
+        let CoarseMesh { vertices, positions, triangles } = exact;
+        let exact = self.dressed(Tile { positions, triangles, ..Tile::default() }, &vertices);
+        let mut others = (0..).zip(&vertices);
+        let numbers: Vec<u32> =
+            shown.mesh.vertices.iter().filter_map(|v| others.find(|(_, other)| *other == v)).map(|(n, _)| n).collect();
+        let (mesh, first) = (shown.mesh, numbers.len() as u32);
         let tops: Vec<u32> = shown.bottoms.iter().map(|bottom| bottom.0).collect();
-        repeat(&mut tile.positions, &tops);
-        let bottoms = tile.positions[first as usize..].iter_mut().zip(&shown.bottoms);
-        bottoms.for_each(|(position, bottom)| position[2] = bottom.1);
-        tile.normals.iter_mut().for_each(|all| repeat(all, &tops));
-        tile.colors.iter_mut().for_each(|all| repeat(all, &tops));
-        let attributes = tile.attributes.clone();
-        tops.iter().for_each(|&top| tile.attributes.push_from(&attributes, top as usize));
+        let all: Vec<u32> = numbers.iter().copied().chain(tops.iter().map(|&top| numbers[top as usize])).collect();
+        let mut positions = mesh.positions;
+        positions.extend(shown.bottoms.iter().map(|&(top, height)| {
+            let [x, y, _] = exact.positions[numbers[top as usize] as usize];
+            [x, y, height]
+        }));
+        let mut triangles = mesh.triangles;
         for [start, end] in shown.skirts {
             let [from, to] = [start, end].map(|bottom| tops[bottom as usize]);
-            tile.triangles.extend([[first + start, first + end, to], [first + start, to, from]]);
+            triangles.extend([[first + start, first + end, to], [first + start, to, from]]);
         }
-        tile
+        [exact.with_style_of(&all, positions, triangles), exact]
     }
 
     /// Adds to a tile what these `vertices` carry, which are its own in their order.
@@ -262,12 +261,6 @@ impl Joined {
         let (tile, vertices) = Tile::with_vertices(&self.positions, triangles);
         self.dressed(tile, &vertices)
     }
-}
-
-/// Appends the values of these vertices once more.
-fn repeat<T: Copy>(all: &mut Vec<T>, vertices: &[u32]) {
-    let again: Vec<T> = vertices.iter().map(|&v| all[v as usize]).collect();
-    all.extend(again);
 }
 
 /// Appends the unit normals (x east, y north, z up) for the `normals` of a mesh that its node stretches by `scale`.

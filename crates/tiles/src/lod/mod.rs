@@ -13,4 +13,4 @@ mod refine;
 mod rim;
 pub mod simplify;
 mod vertex_cells;
-pub mod vertical_error;
+mod vertical_error;

@@ -48,10 +48,10 @@ impl Places {
         &self.triangles[..located]
     }
 
-    /// Takes vertex `v` into `filling`.
-    pub(crate) fn insert(&mut self, v: u32, filling: &mut Filling) {
+    /// Takes vertex `v` into `filling`. `note` gets the triangles that change.
+    pub(crate) fn insert(&mut self, v: u32, filling: &mut Filling, note: impl FnMut(usize)) {
         let start = self.triangles[v as usize] as usize;
-        filling.insert(v, start, &mut self.steps);
+        filling.insert(v, start, &mut self.steps, note);
     }
 }
 
@@ -76,7 +76,7 @@ pub(crate) fn refine(
         let count = ((has as f64 * growth).round() as usize).min(wanted).saturating_sub(has);
         for far in furthest(positions, kept, &allows, filling, places, (round % every, every), count) {
             kept[far.vertex as usize] = true;
-            places.insert(far.vertex, filling);
+            places.insert(far.vertex, filling, |_| {});
         }
     }
     Ok(())

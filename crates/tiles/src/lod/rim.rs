@@ -111,9 +111,6 @@ fn reaches(
             .collect();
         for (k, &(first, from)) in ends.iter().enumerate() {
             let (last, to) = ends[(k + 1) % ends.len()];
-            if border.binary_search(&[from, to]).is_err() {
-                continue;
-            }
             let edge = BorderEdge { ends: [from, to].map(|site| filling.positions[site as usize]) };
             let count = (last + ring.len() - first) % ring.len() + 1;
             let vertices = (first..first + count).map(|at| ring[at % ring.len()]);

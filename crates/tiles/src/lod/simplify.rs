@@ -24,7 +24,7 @@ use crate::lod::outline::Outline;
 use crate::lod::refine::{Places, refine};
 pub use crate::lod::rim::ShownMesh;
 use crate::lod::rim::shown;
-use crate::lod::vertical_error::vertical_error;
+use crate::lod::vertical_error::vertical_errors;
 use breaklines::Breaklines;
 use delaunay::geometry::Bounds;
 use delaunay::geometry::square_grid::SquareGrid;
@@ -56,8 +56,10 @@ pub struct Simplified {
     pub shown: ShownMesh,
     /// The mesh with all vertices on the outline, which ends there.
     pub exact: CoarseMesh,
-    /// The greatest vertical distance of either of them to the original in metres.
-    pub greatest_error: f64,
+    /// The greatest vertical distance between the exact mesh and the original in metres.
+    pub exact_error: f64,
+    /// The greatest vertical distance between either mesh and the original in metres.
+    pub shown_error: f64,
     /// The mean vertical distance to the vertices of the original in metres.
     pub typical_error: f64,
     /// The distance in metres between vertices.
@@ -114,19 +116,22 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     kept_lines.vertices.iter().for_each(|&v| fixed[v] = true);
     let typical_error = fit(positions, |v| fixed[v as usize], &mut filling, &mut places)?;
     interrupt::check()?;
-    let shown = match places.locate_all(&filling) {
+    let (shown, covers) = match places.locate_all(&filling) {
         places if places.len() == positions.len() => {
             let covers = covering(positions, &outline, &filling, places);
-            Some(shown(positions, &outline, &filling, &covers, places, |v| fixed[v as usize], typical_error)?)
+            let may_move = |v: u32| !fixed[v as usize];
+            (Some(shown(positions, &outline, &filling, &covers, places, may_move, typical_error)?), covers)
         }
         // Nearly all triangles are slivers.
-        _ => None,
+        _ => (None, Vec::new()),
     };
-    let exact = with_outline(positions, kept, &outline, filling, &mut places)?;
+    let (exact, is_new) = with_outline(positions, kept, &outline, filling, &mut places)?;
     let shown = shown.unwrap_or_else(|| ShownMesh::without_skirts(exact.clone()));
     interrupt::check()?;
-    let greatest_error = vertical_error(positions, terrain.triangles, &outline.edges, [&shown.mesh, &exact]) * up;
-    Ok(Simplified { shown, exact, greatest_error, typical_error: typical_error * up, spacing: side * xy })
+    let changed = changed_triangles(&shown.mesh, &exact, covers, is_new);
+    let errors = vertical_errors(positions, terrain.triangles, &outline.edges, &exact, (&shown.mesh, &changed));
+    let [exact_error, shown_error] = errors.map(|error| error * up);
+    Ok(Simplified { shown, exact, exact_error, shown_error, typical_error: typical_error * up, spacing: side * xy })
 }
 
 impl Simplified {
@@ -136,28 +141,35 @@ impl Simplified {
         let (positions, triangles) = (terrain.positions.to_vec(), terrain.triangles.to_vec());
         let exact = CoarseMesh { vertices, positions, triangles };
         let shown = ShownMesh::without_skirts(exact.clone());
-        Simplified { shown, exact, greatest_error: 0.0, typical_error: 0.0, spacing: 0.0 }
+        Simplified { shown, exact, exact_error: 0.0, shown_error: 0.0, typical_error: 0.0, spacing: 0.0 }
     }
 }
 
 /// Takes all vertices on the `outline` of the terrain at `positions` into `filling`, with their own heights; it has those that are `kept`.
-/// Returns the triangles within the outline.
+/// Returns the triangles within the outline, and for each triangle of `filling`, as far as that is long, whether it has changed.
 fn with_outline(
     positions: &[[i32; 3]],
     mut kept: Vec<bool>,
     outline: &Outline,
     mut filling: Filling,
     places: &mut Places,
-) -> Result<CoarseMesh> {
+) -> Result<(CoarseMesh, Vec<bool>)> {
+    let mut is_new = vec![false; filling.triangles()];
+    let mut note = |triangle: usize| {
+        if let Some(is_new) = is_new.get_mut(triangle) {
+            *is_new = true;
+        }
+    };
     // Rings lead from place to place, so vertices that follow each other are near each other.
     for &v in outline.rings.iter().flatten() {
         if !std::mem::replace(&mut kept[v as usize], true) {
-            places.insert(v, &mut filling);
+            places.insert(v, &mut filling, &mut note);
         }
     }
     if filling.vertices.len() < count(&kept) {
         // Walks to the places took too long.
         filling = filling.again_with(&kept)?;
+        is_new.fill(true);
     }
     for (position, &v) in filling.positions.iter_mut().zip(&filling.vertices) {
         if outline.on[v as usize] {
@@ -167,7 +179,22 @@ fn with_outline(
     let within = filling.within(&outline.edges)?;
     let (mesh, _) = filling.coarse(&within);
     filling.recycle();
-    Ok(mesh)
+    Ok((mesh, is_new))
+}
+
+/// Returns the triangles of `shown` that may not be in `exact` with the same heights. They are those of a filling that it `covers`; `is_new`
+/// tells which of the filling have changed since.
+fn changed_triangles(shown: &CoarseMesh, exact: &CoarseMesh, covers: Vec<bool>, is_new: Vec<bool>) -> Vec<[u32; 3]> {
+    let mut others = exact.vertices.iter().zip(&exact.positions);
+    let has_moved: Vec<bool> = shown
+        .vertices
+        .iter()
+        .zip(&shown.positions)
+        .map(|(v, position)| others.find(|(other, _)| *other == v).is_none_or(|(_, other)| other != position))
+        .collect();
+    let is_new = covers.into_iter().zip(is_new).filter(|(covers, _)| *covers).map(|(_, is_new)| is_new);
+    let has_changed = |(t, is_new): &(&[u32; 3], bool)| *is_new || t.iter().any(|&v| has_moved[v as usize]);
+    shown.triangles.iter().zip(is_new).filter(has_changed).map(|(t, _)| *t).collect()
 }
 
 fn count(marked: &[bool]) -> usize {

@@ -26,24 +26,25 @@ const MEASURED_FIRST: usize = 1024;
 /// What rounding loses of the range of heights, and more.
 const LOST: f64 = 1.0 / (1u64 << 48) as f64;
 
-/// Returns the greatest vertical distance in steps of z between a terrain and those of the simplified ones in `coarse`. It is never too small.
-/// The triangles `fine` are between `positions` (lattice x, y, z), counterclockwise, and cover their ground, which has this `outline`, once.
-/// The triangles of the simplified ones are between some of these vertices, with other heights, and cover at least the same ground.
-pub fn vertical_error<'a>(
+/// Returns the greatest vertical distances in steps of z between a terrain and two simplified ones: to `exact`, and to the triangles of `shown` that
+/// may be `changed` from those of `exact`, or the former if that is more. They are never too small. The triangles `fine` are between
+/// `positions` (lattice x, y, z), counterclockwise, and cover their ground, which has this `outline`, once. The triangles of the
+/// simplified ones are between some of these vertices, with other heights, and cover at least the same ground.
+pub(crate) fn vertical_errors(
     positions: &[[i32; 3]],
     fine: &[[u32; 3]],
     outline: &[[u32; 2]],
-    coarse: impl IntoIterator<Item = &'a CoarseMesh>,
-) -> f64 {
+    exact: &CoarseMesh,
+    (shown, changed): (&CoarseMesh, &[[u32; 3]]),
+) -> [f64; 2] {
     let heights = HeightBounds::new(positions, fine);
-    let fine = FineTerrain { heights: &heights, positions, triangles: fine, outline };
-    let Some(greatest) = coarse.into_iter().try_fold(0.0, |greatest, mesh| fine.error_of(mesh, greatest)) else {
-        return heights.height_range();
-    };
-    // Rounding loses about 2^-50 of a height.
     let range = heights.height_range();
+    let fine = FineTerrain { heights: &heights, positions, triangles: fine, outline };
+    let of_exact = fine.error_of(exact, &exact.triangles, 0.0).unwrap_or(range);
+    let of_shown = fine.error_of(shown, changed, of_exact).unwrap_or(range.max(of_exact));
+    // Rounding loses about 2^-50 of a height.
     let lost = 1e-9 + range * LOST;
-    if greatest > 0.0 { (greatest + lost).min(range.max(greatest)) } else { 0.0 }
+    [of_exact, of_shown].map(|greatest| if greatest > 0.0 { (greatest + lost).min(range.max(greatest)) } else { 0.0 })
 }
 
 /// The terrain before it was simplified.
@@ -55,17 +56,16 @@ struct FineTerrain<'a> {
 }
 
 impl FineTerrain<'_> {
-    /// Returns the greatest distance to a simplified terrain, or `greatest` if that is more. `None` if that takes too long.
-    fn error_of(&self, coarse: &CoarseMesh, mut greatest: f64) -> Option<f64> {
+    /// Returns the greatest distance to these triangles of a simplified terrain, or `greatest` if that is more. `None` if that takes too long.
+    fn error_of(&self, coarse: &CoarseMesh, all: &[[u32; 3]], mut greatest: f64) -> Option<f64> {
         let corners = |triangle: &[u32; 3]| triangle.map(|v| coarse.positions[v as usize]);
-        let mut bounds: Vec<(u32, u32)> =
-            coarse.triangles.iter().map(|t| self.heights.error_bound(&corners(t))).zip(0..).collect();
+        let mut bounds: Vec<(u32, u32)> = all.iter().map(|t| self.heights.error_bound(&corners(t))).zip(0..).collect();
         // Triangles that may have the greatest error come first, so that most of the others can be skipped.
         let first = MEASURED_FIRST.min(bounds.len());
         if first < bounds.len() {
             bounds.select_nth_unstable_by(first, |a, b| b.cmp(a));
         }
-        let mut steps = StepsLeft::new(coarse.triangles.len());
+        let mut steps = StepsLeft::new(all.len());
         let (first, others) = bounds.split_at(first);
         for bounds in [first, others] {
             let mut measured: Vec<_> = bounds.iter().filter(|(bound, _)| *bound as f64 > greatest).copied().collect();
@@ -73,7 +73,7 @@ impl FineTerrain<'_> {
                 continue;
             }
             measured.sort_unstable_by(|a, b| b.cmp(a));
-            let triangles = || measured.iter().map(|(_, triangle)| coarse.triangles[*triangle as usize]);
+            let triangles = || measured.iter().map(|(_, triangle)| all[*triangle as usize]);
             let near = NearTerrain::new(self, triangles().map(|t| corners(&t)));
             for ((bound, _), triangle) in measured.iter().zip(triangles()) {
                 if *bound as f64 > greatest {
@@ -355,7 +355,8 @@ mod tests {
                 whole.error_of(t.map(|v| coarse.vertices[v as usize]), &corners, &mut steps).unwrap()
             });
             let furthest = furthest.fold(0.0, f64::max);
-            let found = vertical_error(&positions, fine.corners(), &hull, [&coarse]);
+            let [found, of_none] = vertical_errors(&positions, fine.corners(), &hull, &coarse, (&coarse, &[]));
+            prop_assert_eq!(found, of_none);
             let most = furthest + 2e-9;
             prop_assert!(found == 0.0 && furthest == 0.0 || (furthest..most).contains(&found), "{} and {}", found, furthest);
         }
