@@ -218,6 +218,12 @@ impl Curvature {
     }
 }
 
+/// Returns place `i` of `places`.
+#[inline(always)]
+pub fn place_of<const N: usize>(places: &Places<N>, i: usize) -> [f64; 3] {
+    [places[0][i], places[1][i], places[2][i]]
+}
+
 /// Sets `moved` to the displacements of `places`.
 #[multiversion(targets("x86_64+avx2"))]
 fn displacements(curvature: &Curvature, places: &Places<AT_ONCE>, moved: &mut Places<AT_ONCE>) {

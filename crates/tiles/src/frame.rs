@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::axis_scale::{AxisScale, TRANSLATION_STEPS, nearest, nearest_integer};
 use crate::compression::Compression;
-use crate::curvature::{AT_ONCE, Curvature};
+use crate::curvature::{AT_ONCE, Curvature, place_of};
 use delaunay::geometry::Bounds;
 use lattice::Lattice;
 use sys::Result;
@@ -234,7 +234,7 @@ impl Frame {
                 (0..3).for_each(|k| places[k][i] = f64::from(point[k]));
             }
             let moved = curvature.displacements(&places);
-            steps.extend((0..some.len()).map(|i| self.bent(places.map(|along| along[i]), moved.map(|along| along[i]))));
+            steps.extend((0..some.len()).map(|i| self.bent(place_of(&places, i), place_of(&moved, i))));
         }
         Some(steps)
     }
@@ -319,8 +319,8 @@ impl Frame {
             let places = curvature.flat_places(&moved, [xy, xy, up]).map(|along| along.map(nearest));
             let bent = curvature.displacements(&places);
             for i in 0..some.len() {
-                let (place, moved) = (places.map(|along| along[i]), moved.map(|along| along[i]));
-                let [x, y, z] = self.metres(self.bent(place, bent.map(|along| along[i])));
+                let (place, moved) = (place_of(&places, i), place_of(&moved, i));
+                let [x, y, z] = self.metres(self.bent(place, place_of(&bent, i)));
                 if place.iter().any(|v| v.abs() > f64::from(i32::MAX)) || [x, 0.0 - z, y] != moved {
                     return None;
                 }

@@ -112,6 +112,15 @@ impl Grid {
         GridSpan { min: [0, 0], max: [self.columns, self.rows] }
     }
 
+    /// Returns `span` with the buckets around it.
+    pub fn with_neighbours(&self, span: GridSpan) -> GridSpan {
+        let ends = [self.columns, self.rows];
+        GridSpan {
+            min: span.min.map(|line| line.saturating_sub(1)),
+            max: [0, 1].map(|axis| (span.max[axis] + 1).min(ends[axis])),
+        }
+    }
+
     /// Returns the bucket numbers of `span`, row by row.
     pub fn in_span(&self, span: GridSpan) -> impl Iterator<Item = usize> {
         let columns = self.columns;
@@ -259,6 +268,10 @@ mod tests {
             assert_eq!(grid.number_within(span, bucket), number, "{place:?}");
         }
         assert!(grid.span().holds(span) && !span.holds(grid.span()) && span.joined(grid.span()) == grid.span());
+        let wider = grid.with_neighbours(span);
+        let lines = |span: GridSpan| [0, 1].map(|axis| u64::from(span.max[axis] - span.min[axis]));
+        assert_eq!(wider.buckets(), lines(span).map(|lines| lines + 2).iter().product());
+        assert_eq!(grid.with_neighbours(grid.span()), grid.span());
         let below = GridSpan { min: [0, 0], max: span.min };
         assert_eq!((span.shared(below).buckets(), span.meets(below)), (0, false));
     }

@@ -107,10 +107,10 @@ impl Parts {
         self.spans[part.get()]
     }
 
-    /// Returns the buckets that the inputs which `part` is the first to need may have points in: a rectangle around them, or its own if there
-    /// are none.
+    /// Returns the buckets that the inputs which `part` is the first to need may have points in: a rectangle around them, or around its own if
+    /// there are none. Headers may be off by a little, so it has the buckets beside these too.
     pub fn read_by(&self, part: PartIndex) -> GridSpan {
-        self.readers.reach[part.get()].unwrap_or(self.span(part))
+        self.grid.with_neighbours(self.readers.reach[part.get()].unwrap_or(self.span(part)))
     }
 
     /// Tells whether an input may have points in `part`.
@@ -187,5 +187,23 @@ impl PartCutter {
             }
         }
         node
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_input_is_read_by_the_first_part_that_it_reaches() {
+        let grid = Grid::over(Bounds { min: [0, 0], max: [99, 99] }, 100);
+        let span = |min, max| grid.span_of(Bounds { min, max });
+        let parts = [span([0, 0], [49, 99]), span([50, 0], [99, 49]), span([50, 50], [99, 99])];
+        let reach =
+            [span([60, 60], [69, 69]), span([40, 0], [59, 9]), span([0, 20], [9, 29]), span([70, 90], [99, 99])];
+        let readers = Readers::of(&parts, &reach);
+        assert_eq!(readers.new_inputs, [vec![1, 2], vec![], vec![0, 3]]);
+        assert_eq!(readers.reach, [Some(span([0, 0], [59, 29])), None, Some(span([60, 60], [99, 99]))]);
+        assert_eq!(readers.most_buckets(), 18);
     }
 }
