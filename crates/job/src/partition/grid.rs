@@ -270,7 +270,7 @@ mod tests {
         assert!(grid.span().holds(span) && !span.holds(grid.span()) && span.joined(grid.span()) == grid.span());
         let wider = grid.with_neighbours(span);
         let lines = |span: GridSpan| [0, 1].map(|axis| u64::from(span.max[axis] - span.min[axis]));
-        assert_eq!(wider.buckets(), lines(span).map(|lines| lines + 2).iter().product());
+        assert_eq!(wider.buckets(), lines(span).map(|lines| lines + 2).iter().product::<u64>());
         assert_eq!(grid.with_neighbours(grid.span()), grid.span());
         let below = GridSpan { min: [0, 0], max: span.min };
         assert_eq!((span.shared(below).buckets(), span.meets(below)), (0, false));
