@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::clouds;
 use crate::common::shared;
-use crate::levels::{borders_are_the_exact_ones, errors_are_true};
+use crate::levels::{coarser_tiles_cover_their_leaves, errors_are_true};
 use crate::program::{Job, gdt_batch, number};
 use crate::tileset::{extent, keeps_the_rules, tiles, triangles};
 
@@ -60,7 +60,7 @@ fn coarser_levels_leave_the_void_empty_too() {
     job.verified();
     let tiles = tiles(&job);
     keeps_the_rules(&job, &tiles);
-    borders_are_the_exact_ones(&job, &tiles);
+    coarser_tiles_cover_their_leaves(&job, &tiles);
     errors_are_true(&job, &tiles, "two fields");
     let [low, high] = extent(&tiles[0].json);
     let middle = (low[0] + high[0]) / 2.0;

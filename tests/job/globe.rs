@@ -212,25 +212,32 @@ fn x_and_y_stay_on_the_lattice_where_programs_read_them() {
     }
 }
 
-/// Returns the greatest distance on the globe between the places that two tiles have for one vertex on a border of both, with the number of
-/// vertices on borders of several depths, and the most depths.
+/// Returns how much further apart on the globe the places are that two tiles have for one x and y than their heights are, with the number of
+/// such x and y on borders of several depths, and the most depths.
 pub(crate) fn gaps(job: &Job, tiles: &[Tile]) -> (f64, usize, usize) {
     let source = Source::of(job);
-    let mut known = HashMap::<[u64; 2], Vec<([f64; 3], usize)>>::new();
+    let mut known = HashMap::<[u64; 2], Vec<([f64; 3], f64, usize)>>::new();
     for tile in tiles {
         // Vertices inside a coarser tile stand for the surface around them, and no other tile shown at the same time has them.
         let on_border: HashSet<[u64; 3]> = outline(&triangles(job, tile)).into_iter().flatten().collect();
         for (at, place) in source.corners(job, tile).into_iter().filter(|(_, place)| on_border.contains(&bits(*place)))
         {
             let places = known.entry([at[0], at[1]].map(f64::to_bits)).or_default();
-            let here = (applied(&tile.placed, place), tile.above.len());
+            let here = (applied(&tile.placed, place), at[2], tile.above.len());
             if !places.contains(&here) {
                 places.push(here);
             }
         }
     }
-    let depths = |places: &[([f64; 3], usize)]| places.iter().map(|(_, depth)| depth).collect::<HashSet<_>>().len();
-    let apart = |places: &Vec<([f64; 3], usize)>| places.iter().map(|p| distance(p.0, places[0].0)).fold(0.0, f64::max);
+    let depths = |places: &[([f64; 3], f64, usize)]| places.iter().map(|p| p.2).collect::<HashSet<_>>().len();
+    let metres = source.extras.metres_per_unit_z;
+    let apart = |places: &Vec<([f64; 3], f64, usize)>| {
+        let (first, height, _) = places[0];
+        let more = |&(place, other, _): &([f64; 3], f64, usize)| {
+            distance(place, first) - 1.01 * metres * (other - height).abs()
+        };
+        places.iter().map(more).fold(0.0, f64::max)
+    };
     let gap = known.values().map(apart).fold(0.0, f64::max);
     let shared = known.values().filter(|places| depths(places) > 1).count();
     (gap, shared, known.values().map(|places| depths(places)).max().unwrap())

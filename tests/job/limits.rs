@@ -114,7 +114,7 @@ fn one_raise_of_the_memory_suffices_for_large_tiles() {
 fn one_raise_of_the_memory_suffices_for_points_that_no_tile_can_decide() {
     let folder = tempfile::tempdir().unwrap();
     // Two short lines far apart: the disc of every triangle is wider than any cell.
-    let cloud: Vec<[i64; 3]> = (0..16_000).map(|i| [i / 2, i % 2 * 1_000_000, i % 7]).collect();
+    let cloud: Vec<[i64; 3]> = (0..24_000).map(|i| [i / 2, i % 2 * 1_000_000, i % 7]).collect();
     let file = clouds::write(folder.path(), "lines.csv", &cloud);
     let job = Job::on(&[&file]).tiles_of(1_000).threads(1);
     let mut options = gdt_batch::config::load(&job.config()).unwrap();

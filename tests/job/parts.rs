@@ -2,7 +2,7 @@
 
 use crate::clouds::{self, Cloud};
 use crate::las_file::LasFile;
-use crate::levels::{borders_are_the_exact_ones, errors_are_true, hills};
+use crate::levels::{coarser_tiles_cover_their_leaves, errors_are_true, hills};
 use crate::program::{Job, number};
 use crate::tileset::{keeps_the_rules, tiles};
 use std::collections::BTreeMap;
@@ -86,7 +86,7 @@ fn levels_reach_over_the_parts() {
     keeps_the_rules(&job, &tiles);
     let coarser = tiles.iter().filter(|tile| !tile.json["children"].is_null());
     assert_eq!(number(&report["levels"]["files"]), coarser.count() as u64);
-    borders_are_the_exact_ones(&job, &tiles);
+    coarser_tiles_cover_their_leaves(&job, &tiles);
     errors_are_true(&job, &tiles, "hills in parts");
 }
 

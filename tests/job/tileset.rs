@@ -165,12 +165,13 @@ pub(crate) fn triangles(job: &Job, tile: &Tile) -> Vec<[[f64; 3]; 3]> {
     found
 }
 
-/// Returns the height of a triangle at x, y, or `None` outside it.
+/// Returns the height of a triangle at x, y, or `None` outside it and for vertical ones.
 pub(crate) fn height(t: &[[f64; 3]; 3], [x, y]: [f64; 2]) -> Option<f64> {
     let area = |a: [f64; 3], b: [f64; 3]| (a[0] - x) * (b[1] - y) - (b[0] - x) * (a[1] - y);
     let weights = [area(t[1], t[2]), area(t[2], t[0]), area(t[0], t[1])];
     let total: f64 = weights.iter().sum();
-    weights.iter().all(|&w| w >= 0.0).then(|| (0..3).map(|i| weights[i] * t[i][2]).sum::<f64>() / total)
+    (total > 0.0 && weights.iter().all(|&w| w >= 0.0))
+        .then(|| (0..3).map(|i| weights[i] * t[i][2]).sum::<f64>() / total)
 }
 
 /// Asserts the rules of 3D Tiles 1.1, and that every GLB file is the content of exactly one tile.

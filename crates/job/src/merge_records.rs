@@ -156,15 +156,21 @@ impl SeamOfTile {
 }
 
 impl Seam {
-    /// Sorts `triangles` by the tiles that they touch. The node answers that ways from `trimmed`, which are sorted, lead out of the hull:
-    /// those of as many triangles as `hull` says. If that is most of the mesh, nothing is trimmed.
-    pub fn new(triangles: &[SeamTriangle], mut trimmed: Vec<TrimmedEdge>, hull: HullCount) -> Seam {
+    /// Sorts `count` triangles, which `triangle` returns by their numbers, by the tiles that they touch. The node answers that ways from
+    /// `trimmed`, which are sorted, lead out of the hull: those of as many triangles as `hull` says. If that is most of the mesh, nothing is
+    /// trimmed.
+    pub fn new(
+        count: u32,
+        triangle: impl Fn(u32) -> SeamTriangle,
+        mut trimmed: Vec<TrimmedEdge>,
+        hull: HullCount,
+    ) -> Seam {
         if hull.is_most() {
             trimmed.clear();
         }
-        let mut touching: Vec<(TileIndex, u32)> = Vec::with_capacity(triangles.len() * 2);
-        for (at, triangle) in (0..).zip(triangles) {
-            let mut tiles = triangle.map(|corner| corner.tile);
+        let mut touching: Vec<(TileIndex, u32)> = Vec::with_capacity(count as usize * 2);
+        for at in 0..count {
+            let mut tiles = triangle(at).map(|corner| corner.tile);
             tiles.sort_unstable();
             touching.extend((0..3).filter(|&i| i == 0 || tiles[i] != tiles[i - 1]).map(|i| (tiles[i], at)));
         }
@@ -176,7 +182,7 @@ impl Seam {
                 Some([last, _, count]) if *last == tile.0 => *count += 1,
                 _ => seam.index.push([tile.0, seam.triangles.len() as u32, 1]),
             }
-            seam.triangles.push(triangles[at as usize]);
+            seam.triangles.push(triangle(at));
         }
         seam
     }
@@ -230,7 +236,7 @@ mod tests {
             |tile: u32, site: u32| BorderVertex { tile: TileIndex(tile), site: SiteIndex(site), position: [0; 3] };
         let triangles: Vec<SeamTriangle> =
             (0..200).map(|i| [i * 7 % 5, i * 3 % 4, i / 100 * 250].map(|tile| corner(tile, 1000 - i))).collect();
-        let seam = Seam::new(&triangles, Vec::new(), HullCount::default());
+        let seam = Seam::new(200, |at| triangles[at as usize], Vec::new(), HullCount::default());
         assert!(seam.index.is_sorted_by(|a, b| a[0] < b[0]));
         for &[tile, first, count] in &seam.index {
             let touches = |triangle: &&SeamTriangle| triangle.iter().any(|corner| corner.tile.0 == tile);

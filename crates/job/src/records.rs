@@ -392,8 +392,10 @@ pub struct TileSummary {
     pub mesh_error: f64,
     /// About the mean vertical distance to the vertices of the exact mesh in metres.
     pub typical_error: f64,
-    /// The least and greatest lattice x, y, z of the exact mesh below and of the tile. Without a triangle, the least are greater.
+    /// The least and greatest lattice x, y, z of the exact mesh below. Without a triangle, the least are greater.
     corners: [[i32; 3]; 2],
+    /// The same of all that is drawn of it at any level up to this one.
+    drawn: [[i32; 3]; 2],
     /// The vertices of the mesh that the tile above it is made from; 0 if there is none.
     pub vertices: u32,
     unused: u32,
@@ -409,6 +411,7 @@ impl TileSummary {
             mesh_error: 0.0,
             typical_error: 0.0,
             corners,
+            drawn: corners,
             vertices: vertices as u32,
             unused: 0,
         }
@@ -432,18 +435,25 @@ impl TileSummary {
         Ok(own)
     }
 
-    /// Makes the box large enough for `bounds` too.
-    pub fn include(&mut self, bounds: Option<Bounds<3>>) {
-        if let Some(all) = self.bounds().into_iter().chain(bounds).reduce(Bounds::union) {
-            self.corners = [all.min, all.max];
-        }
+    /// Returns the box of the exact mesh below; `None` if it has no triangle.
+    pub fn bounds(&self) -> Option<Bounds<3>> {
+        box_between(self.corners)
     }
 
-    /// Returns the box of the exact mesh below and of the tile; `None` if there is no triangle.
-    pub fn bounds(&self) -> Option<Bounds<3>> {
-        let [min, max] = self.corners;
-        (min[0] <= max[0]).then_some(Bounds { min, max })
+    /// Returns the box of all that is drawn of it, at this level and below; `None` if there is no triangle.
+    pub fn drawn(&self) -> Option<Bounds<3>> {
+        box_between(self.drawn)
     }
+
+    /// Makes the box of what is drawn large enough for another one.
+    pub fn draw(&mut self, other: Bounds<3>) {
+        let Bounds { min, max } = self.drawn().map_or(other, |own| own.union(other));
+        self.drawn = [min, max];
+    }
+}
+
+fn box_between([min, max]: [[i32; 3]; 2]) -> Option<Bounds<3>> {
+    (min[0] <= max[0]).then_some(Bounds { min, max })
 }
 
 /// What a coarser tile leaves for the tile above it and for `tileset.json`.

@@ -9,6 +9,7 @@
 //! bits. It changes so slowly from place to place that the lattice point can be found from where it was moved to.
 
 use delaunay::geometry::Bounds;
+use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 
 /// The metres in a unit of the coefficients. Rounding to it hides the last digits in which mathematics libraries differ.
@@ -16,6 +17,12 @@ const UNIT: f64 = 1.0 / 1024.0;
 
 /// The greatest degree.
 pub(crate) const MOST_DEGREE: usize = 12;
+
+/// Places that are looked at together: processors compute several numbers at a time.
+pub const AT_ONCE: usize = 64;
+
+/// The coordinates of places, or how far they are moved, by axis.
+pub type Places<const N: usize> = [[f64; N]; 3];
 
 /// Rounds of looking for the flat place. Each divides the error by the steepness of the displacement, which is far below one.
 const ROUNDS: usize = 40;
@@ -31,6 +38,31 @@ pub struct Curvature {
     written: Written,
     /// The sizes of the lattice box.
     half: [f64; 3],
+    /// What the displacement along each axis depends on.
+    along: [DependsOn; 3],
+}
+
+/// What the displacement along an axis depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum DependsOn {
+    /// Nothing is moved.
+    Nothing,
+    /// x and y.
+    Ground,
+    /// x, y and z.
+    Height,
+}
+
+impl DependsOn {
+    /// Returns what the displacement along axis `a` with these terms depends on.
+    fn of(terms: &[[f64; 6]], a: usize) -> DependsOn {
+        let is_zero = |k: usize| terms.iter().all(|term| term[k] == 0.0);
+        match (is_zero(a), is_zero(3 + a)) {
+            (true, true) => DependsOn::Nothing,
+            (false, true) => DependsOn::Ground,
+            (_, false) => DependsOn::Height,
+        }
+    }
 }
 
 /// What files say.
@@ -64,7 +96,8 @@ impl TryFrom<Written> for Curvature {
         if !coefficients.as_flattened().iter().all(is_whole) {
             return Err("a term of a curvature is not a whole number");
         }
-        Ok(Curvature { half: written.half.map(f64::from), written })
+        let along = [0, 1, 2].map(|a| DependsOn::of(coefficients, a));
+        Ok(Curvature { half: written.half.map(f64::from), along, written })
     }
 }
 
@@ -89,40 +122,60 @@ impl Curvature {
 
     /// Tells whether everything is moved along the vertical alone, whatever its height.
     pub fn is_vertical(&self) -> bool {
-        self.written.coefficients.iter().all(|term| (0..6).all(|a| a == 2 || term[a] == 0.0))
+        matches!(self.along, [DependsOn::Nothing, DependsOn::Nothing, DependsOn::Nothing | DependsOn::Ground])
     }
 
     /// Returns the displacement in metres of a place on the lattice, whole or not.
     pub fn displacement(&self, point: [f64; 3]) -> [f64; 3] {
-        let along = |k: usize| ((point[k] - f64::from(self.written.centre[k])) / self.half[k]).clamp(-1.0, 1.0);
-        let [u, v, w] = [along(0), along(1), along(2)];
-        let degree = self.written.degree;
-        let mut terms = self.written.coefficients.iter().rev();
-        let mut sum = [0.0; 3];
-        for i in (0..=degree).rev() {
-            let mut row = [0.0; 3];
-            for term in terms.by_ref().take(degree - i + 1) {
-                (0..3).for_each(|a| row[a] = row[a] * v + (term[a] + w * term[3 + a]));
+        self.moved(&point.map(|coordinate| [coordinate])).map(|[metres]| metres)
+    }
+
+    /// Does what [`Curvature::displacement`] does, with the same bits, for many places.
+    pub fn displacements(&self, places: &Places<AT_ONCE>) -> Places<AT_ONCE> {
+        let mut moved = [[0.0; AT_ONCE]; 3];
+        displacements(self, places, &mut moved);
+        moved
+    }
+
+    #[inline(always)]
+    fn moved<const N: usize>(&self, places: &Places<N>) -> Places<N> {
+        let Written { centre, degree, coefficients, .. } = &self.written;
+        let mut shares = [[0.0; N]; 3];
+        for k in 0..3 {
+            let (centre, half) = (f64::from(centre[k]), self.half[k]);
+            for (share, place) in shares[k].iter_mut().zip(&places[k]) {
+                *share = ((place - centre) / half).clamp(-1.0, 1.0);
             }
-            (0..3).for_each(|a| sum[a] = sum[a] * u + row[a]);
         }
-        sum.map(|metres| metres * UNIT)
+        let mut moved = [[0.0; N]; 3];
+        for a in 0..3 {
+            match self.along[a] {
+                DependsOn::Nothing => {}
+                DependsOn::Ground => {
+                    sums(coefficients, *degree, |row, term, i| row * shares[1][i] + term[a], &shares[0], &mut moved[a])
+                }
+                DependsOn::Height => sums(
+                    coefficients,
+                    *degree,
+                    |row, term, i| row * shares[1][i] + (term[a] + shares[2][i] * term[3 + a]),
+                    &shares[0],
+                    &mut moved[a],
+                ),
+            }
+        }
+        moved
     }
 
     /// Returns the place on the lattice that is moved to `moved` (metres east, north and up from lattice point 0, 0, 0), on a lattice with these
     /// `steps` in metres. Whole numbers are not met exactly, but to far less than half a step.
     pub fn flat(&self, moved: [f64; 3], steps: [f64; 3]) -> [f64; 3] {
-        let mut place = [0, 1, 2].map(|k| moved[k] / steps[k]);
-        for _ in 0..ROUNDS {
-            let displacement = self.displacement(place);
-            let next = [0, 1, 2].map(|k| (moved[k] - displacement[k]) / steps[k]);
-            let is_found = (0..3).all(|k| (next[k] - place[k]).abs() < 1e-5);
-            place = next;
-            if is_found {
-                break;
-            }
-        }
-        place
+        let displaced = |places: &Places<1>| self.moved(places);
+        flat_places(&moved.map(|metres| [metres]), steps, displaced).map(|[place]| place)
+    }
+
+    /// Does what [`Curvature::flat`] does for many places, as near or nearer.
+    pub fn flat_places(&self, moved: &Places<AT_ONCE>, steps: [f64; 3]) -> Places<AT_ONCE> {
+        flat_places(moved, steps, |places| self.displacements(places))
     }
 
     /// Returns at places all over the box how much the displacement along axis a changes in a metre along axis b, as `[a][b]`: the greatest of all.
@@ -165,6 +218,66 @@ impl Curvature {
     }
 }
 
+/// Returns place `i` of `places`.
+#[inline(always)]
+pub fn place_of<const N: usize>(places: &Places<N>, i: usize) -> [f64; 3] {
+    [places[0][i], places[1][i], places[2][i]]
+}
+
+/// Sets `moved` to the displacements of `places`.
+#[multiversion(targets("x86_64+avx2"))]
+fn displacements(curvature: &Curvature, places: &Places<AT_ONCE>, moved: &mut Places<AT_ONCE>) {
+    *moved = curvature.moved(places);
+}
+
+/// Sets `moved` to the metres along one axis of places whose shares along x are `shares`. `with_term` adds a term to the sum of a row, for
+/// the place with the index that it gets.
+#[inline(always)]
+fn sums<const N: usize>(
+    terms: &[[f64; 6]],
+    degree: usize,
+    with_term: impl Fn(f64, &[f64; 6], usize) -> f64,
+    shares: &[f64; N],
+    moved: &mut [f64; N],
+) {
+    let mut terms = terms.iter().rev();
+    let mut sums = [0.0; N];
+    for i in (0..=degree).rev() {
+        let mut row = [0.0; N];
+        for term in terms.by_ref().take(degree - i + 1) {
+            (0..N).for_each(|i| row[i] = with_term(row[i], term, i));
+        }
+        (0..N).for_each(|i| sums[i] = sums[i] * shares[i] + row[i]);
+    }
+    *moved = sums.map(|metres| metres * UNIT);
+}
+
+/// Looks for the places that are `moved` to these ones, by the displacements that `displaced` returns, until all are found.
+#[inline(always)]
+fn flat_places<const N: usize>(
+    moved: &Places<N>,
+    steps: [f64; 3],
+    displaced: impl Fn(&Places<N>) -> Places<N>,
+) -> Places<N> {
+    let mut places = *moved;
+    (0..3).for_each(|k| places[k].iter_mut().for_each(|place| *place /= steps[k]));
+    for _ in 0..ROUNDS {
+        let displaced = displaced(&places);
+        let mut is_found = true;
+        for k in 0..3 {
+            for i in 0..N {
+                let next = (moved[k][i] - displaced[k][i]) / steps[k];
+                is_found &= (next - places[k][i]).abs() < 1e-5;
+                places[k][i] = next;
+            }
+        }
+        if is_found {
+            break;
+        }
+    }
+    places
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -202,6 +315,24 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn many_places_are_moved_as_each_alone(seed in prop::array::uniform3(-3_000_000..3_000_000i32), step in 1..99_999i32) {
+            let mut upwards = sphere().written;
+            upwards.coefficients.iter_mut().for_each(|term| (term[3], term[4]) = (0.0, 0.0));
+            for curvature in [sphere(), Curvature::try_from(upwards).unwrap()] {
+                let place = |i: usize, k: usize| f64::from(seed[k]) + f64::from(step) * (i * (k + 1)) as f64 / 7.0;
+                let places: Places<AT_ONCE> = std::array::from_fn(|k| std::array::from_fn(|i| place(i, k)));
+                let moved = curvature.displacements(&places);
+                let back: Places<AT_ONCE> = std::array::from_fn(|k| std::array::from_fn(|i| places[k][i] * 0.01 + moved[k][i]));
+                let flat = curvature.flat_places(&back, [0.01; 3]);
+                for i in 0..AT_ONCE {
+                    let alone = places.map(|along| along[i]);
+                    prop_assert_eq!(moved.map(|along| along[i].to_bits()), curvature.displacement(alone).map(f64::to_bits));
+                    prop_assert!((0..3).all(|k| (flat[k][i] - alone[k]).abs() < 1e-3));
+                }
+            }
+        }
+
         #[test]
         fn the_lattice_point_is_found_again(x in -2_000_000..2_000_000i32, y in -2_000_000..2_000_000i32, z in -99_000..99_000i32) {
             let (curvature, point) = (sphere(), [x, y, z].map(f64::from));

@@ -97,6 +97,7 @@ pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<(LevelS
     let bounds = children.iter().filter_map(|child| child.own.bounds()).reduce(Bounds::union);
     let (mut stats, mut files) = (LevelStats::default(), Vec::new());
     let mut own = TileSummary::new(bounds, 0);
+    children.iter().filter_map(|child| child.own.drawn()).for_each(|bounds| own.draw(bounds));
     if let (true, Some(bounds)) = (context.meshes, bounds) {
         match memory_for(&children).filter(|bytes| *bytes <= context.sizes.memory) {
             None => stats.left_out = 1,
@@ -104,7 +105,7 @@ pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<(LevelS
                 let Level { shown, surface, exact, simple } = Level::of(context, coarse.node, &children)?;
                 let of_children =
                     |error: fn(&TileSummary) -> f64| children.iter().map(|c| error(&c.own)).fold(0.0, f64::max);
-                own.include(shown.bounds());
+                shown.bounds().into_iter().for_each(|bounds| own.draw(bounds));
                 // No distance is greater than the range of heights: all meshes lie within it.
                 let range = height_range(&context.style.frame, bounds.union(surface));
                 let of_meshes = of_children(|own| own.mesh_error);

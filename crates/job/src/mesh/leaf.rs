@@ -11,6 +11,7 @@ use crate::partition::point_file::PointFiles;
 use crate::partition::result::Partition;
 use crate::plan::job_plan::Plan;
 use crate::records::{BorderVertex, Leaf, PartialNormals, Store};
+use bytemuck::Zeroable;
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::mesh::index::{HalfEdgeIndex, SiteIndex};
@@ -87,7 +88,7 @@ pub fn triangulate_leaf(
     frontier.save(store, node)?;
     if is_root {
         // No merge answers what this tile asks.
-        Seam::new(&[], trimmed, HullCount { slivers, triangles }).save(store, node)?;
+        Seam::new(0, |_| [BorderVertex::zeroed(); 3], trimmed, HullCount { slivers, triangles }).save(store, node)?;
     }
     triangulation::recycle(mesh);
     let vertices = VertexDigest::of(points.iter().map(Point::corner));

@@ -30,8 +30,9 @@ pub fn merge_frontiers(
     memory: u64,
     node: NodeIndex,
 ) -> crate::Result<Vec<TileIndex>> {
-    check_memory(below.iter().map(|&(store, child)| Frontier::count(store, child)).sum::<Result<u64>>()?, memory)?;
-    let (union, flows_below) = join(below)?;
+    let sites = below.iter().map(|&(store, child)| Frontier::count(store, child)).sum::<Result<u64>>()?;
+    check_memory(sites, memory)?;
+    let (union, flows_below) = join(below, sites)?;
     let sites: Vec<Site> = union.iter().map(BorderVertex::plane).collect();
     let mesh = divide_and_conquer::triangulate(&sites).map_err(|e| Error::of_triangulation(e.is_stopped(), e))?;
     interrupt::check()?;
@@ -44,18 +45,15 @@ pub fn merge_frontiers(
     let node_mesh =
         NodeMesh { mesh: &mesh, sites: &sites, found: &found, rule: HullRule::of(plan)?, is_root: cell.is_none() };
     let flows = flows_of_merge(&node_mesh, &flows_below, |corners| corners.map(|v| union[v.get()].tile))?;
-    let seam: Vec<SeamTriangle> = mesh
-        .triangles
-        .iter()
-        .zip(&found.states)
-        .filter(|(_, state)| **state == TriangleState::Final)
-        .map(|(corners, _)| corners.map(|v| union[v.get()]))
-        .collect();
-    // The seam takes as much memory as the mesh.
-    drop((mesh, sites, covered));
-    let limit = PrecisionLimit::of(&plan.frame);
-    seam.iter().try_for_each(|corners| limit.check(corners.map(|corner| corner.plane())))?;
-    let hull = HullCount { slivers: flows.slivers, triangles: flows_below.triangles + seam.len() as u64 };
+    // The seam takes as much memory as the mesh, which goes first.
+    let mut seam = mesh.triangles;
+    let mut states = found.states.iter();
+    seam.retain(|_| states.next() == Some(&TriangleState::Final));
+    drop((mesh.twins, sites, covered));
+    let seam_triangle = |at: u32| -> SeamTriangle { seam[at as usize].map(|v| union[v.get()]) };
+    let (limit, count) = (PrecisionLimit::of(&plan.frame), seam.len() as u32);
+    (0..count).try_for_each(|at| limit.check(seam_triangle(at).map(|corner| corner.plane())))?;
+    let hull = HullCount { slivers: flows.slivers, triangles: flows_below.triangles + u64::from(count) };
     let frontier = Frontier {
         sites: found.frontier.iter().map(|&site| union[site.get()]).collect(),
         boundary: found.boundary,
@@ -64,16 +62,16 @@ pub fn merge_frontiers(
         triangles: hull.triangles,
     };
     interrupt::check()?;
-    Seam::new(&seam, flows.trimmed, hull).save(store, node)?;
+    Seam::new(count, seam_triangle, flows.trimmed, hull).save(store, node)?;
     frontier.save(store, node)?;
     let above = frontier.tiles();
     let tiles_below = tiles_of(&union, &flows_below.questions);
     Ok(tiles_below.into_iter().filter(|tile| above.binary_search(tile).is_err()).collect())
 }
 
-/// Joins frontiers into one. Their boundaries, and what they say of ways to the hull, come apart from their sites.
-fn join(frontiers: &[(&Store, NodeIndex)]) -> Result<(Vec<BorderVertex>, FlowsBelow)> {
-    let (mut all, mut flows) = (Vec::new(), FlowsBelow::default());
+/// Joins frontiers of at most `sites` sites into one. Their boundaries, and what they say of ways to the hull, come apart from their sites.
+fn join(frontiers: &[(&Store, NodeIndex)], sites: u64) -> Result<(Vec<BorderVertex>, FlowsBelow)> {
+    let (mut all, mut flows) = (Vec::with_capacity(sites as usize), FlowsBelow::default());
     for &(store, node) in frontiers {
         let Frontier { sites, boundary, passes, questions, triangles } = Frontier::load(store, node)?;
         let (vertex, edge) = (all.len() as u32, flows.boundary.len() as u32);

@@ -240,7 +240,9 @@ impl<'a> PointsInBlocks<'a> {
         let part = &self.parts[number];
         let file = file_of_selected(parts);
         let file = PointFile::create(&directory.point_file(file), file)?;
-        let buckets = Buckets::new(&file, parts.grid.buckets(), read_buffer_memory(&self.plan.options));
+        let span = parts.span(PartIndex::new(number));
+        let grid = parts.grid.within(span);
+        let buckets = Buckets::new(&file, grid.buckets(), read_buffer_memory(&self.plan.options));
         let buckets = buckets.with_digests(self.plan.options.updates);
         let tiles: Vec<TileIndex> = part.partition.tree.tiles().collect();
         let write = |tile| -> Result<[u64; 2]> {
@@ -252,14 +254,15 @@ impl<'a> PointsInBlocks<'a> {
                 let selected: HashSet<Site> = selected.within(bounds).map(|[x, y, _]| [x, y]).collect();
                 sites.retain(|site| selected.contains(&site.position));
             }
-            BucketSorter::new(&parts.grid, &buckets).add(&sites)?;
+            BucketSorter::new(&grid, &buckets).add(&sites)?;
             Ok([wanted, duplicates])
         };
         let sum = |a: [u64; 2], b: [u64; 2]| Ok([a[0] + b[0], a[1] + b[1]]);
         let [wanted, duplicates] = tiles.into_par_iter().with_max_len(1).map(write).try_reduce(|| [0; 2], sum)?;
         let buckets = buckets.finish()?;
         let digest = buckets.iter().fold(0, |all, bucket| bucket.digest.wrapping_add(all));
-        let blocks = ReadBlocks::of(buckets);
+        let mut blocks = ReadBlocks::default();
+        parts.grid.in_span(span).zip(&buckets).for_each(|(number, bucket)| blocks.add(number, &bucket.blocks));
         if sync {
             file.sync()?;
         }

@@ -5,6 +5,7 @@ use crate::partition::buckets::Buckets;
 use crate::partition::grid::Grid;
 use crate::plan::job_plan::Plan;
 use breaklines::{BreaklineSite, Breaklines, FeatureKind};
+use delaunay::geometry::Site;
 use points::Point;
 use points::surface::SurfaceShares;
 use sys::Result;
@@ -45,7 +46,7 @@ impl<'a> BreaklineFilter<'a> {
     }
 }
 
-/// Adds the sites of lines to the buckets that `is_wanted`. The greatest colour of the points is `max_rgb`.
+/// Adds the sites of lines at the places that `is_wanted` to the buckets of `grid`. The greatest colour of the points is `max_rgb`.
 ///
 /// # Errors
 /// Those of the buckets, and of [`Plan::built_breaklines`].
@@ -54,11 +55,11 @@ pub(crate) fn add_line_sites(
     max_rgb: u16,
     grid: &Grid,
     buckets: &Buckets,
-    is_wanted: impl Fn(usize) -> bool,
+    is_wanted: impl Fn(Site) -> bool,
 ) -> Result<()> {
     let Some(lines) = plan.built_breaklines()? else { return Ok(()) };
     // Points have the numbers below.
-    let sites = (plan.records..).zip(lines.sites()).filter(|(_, site)| is_wanted(grid.bucket(site.place) as usize));
+    let sites = (plan.records..).zip(lines.sites()).filter(|(_, site)| is_wanted(site.place));
     let (mut sorter, mut slice) = (BucketSorter::new(grid, buckets), Vec::with_capacity(SLICE));
     for (order, site) in sites {
         slice.push(point_of(site, order, max_rgb));

@@ -25,6 +25,30 @@ pub struct GridSpan {
 }
 
 impl GridSpan {
+    /// Returns the least rectangle around both.
+    pub fn joined(self, other: GridSpan) -> GridSpan {
+        GridSpan {
+            min: [0, 1].map(|axis| self.min[axis].min(other.min[axis])),
+            max: [0, 1].map(|axis| self.max[axis].max(other.max[axis])),
+        }
+    }
+
+    /// Returns what both have.
+    pub fn shared(self, other: GridSpan) -> GridSpan {
+        let min = [0, 1].map(|axis| self.min[axis].max(other.min[axis]));
+        GridSpan { min, max: [0, 1].map(|axis| self.max[axis].min(other.max[axis]).max(min[axis])) }
+    }
+
+    /// Tells whether the rectangle has all buckets of the other one.
+    pub fn holds(self, other: GridSpan) -> bool {
+        self.shared(other) == other
+    }
+
+    /// Returns the number of buckets.
+    pub fn buckets(self) -> u64 {
+        [0, 1].map(|axis| u64::from(self.max[axis] - self.min[axis])).iter().product()
+    }
+
     /// Tells whether the rectangles share a bucket.
     pub fn meets(self, other: GridSpan) -> bool {
         (0..2).all(|axis| self.min[axis] < other.max[axis] && other.min[axis] < self.max[axis])
@@ -50,6 +74,24 @@ impl Grid {
         }
     }
 
+    /// Returns the grid of the buckets of `span` alone, numbered in the order of [`Grid::in_span`].
+    pub fn within(&self, span: GridSpan) -> Grid {
+        let [columns, rows] = [0, 1].map(|axis| span.max[axis] - span.min[axis]);
+        Grid { origin: [0, 1].map(|axis| self.line(axis, span.min[axis]) as i32), columns, rows, ..*self }
+    }
+
+    /// Returns the number that a bucket has in the grid of the buckets of `span` alone. `None` if it is not one of them.
+    pub fn number_within(&self, span: GridSpan, bucket: usize) -> Option<usize> {
+        let [column, row] = self.column_and_row(u32::try_from(bucket).ok()?);
+        let is_inside = (span.min[0]..span.max[0]).contains(&column) && (span.min[1]..span.max[1]).contains(&row);
+        let width = span.max[0] - span.min[0];
+        is_inside.then(|| (row - span.min[1]) as usize * width as usize + (column - span.min[0]) as usize)
+    }
+
+    fn column_and_row(&self, bucket: u32) -> [u32; 2] {
+        [bucket % self.columns, bucket / self.columns]
+    }
+
     /// Returns the number of buckets.
     pub fn buckets(&self) -> usize {
         self.columns as usize * self.rows as usize
@@ -70,6 +112,15 @@ impl Grid {
         GridSpan { min: [0, 0], max: [self.columns, self.rows] }
     }
 
+    /// Returns `span` with the buckets around it.
+    pub fn with_neighbours(&self, span: GridSpan) -> GridSpan {
+        let ends = [self.columns, self.rows];
+        GridSpan {
+            min: span.min.map(|line| line.saturating_sub(1)),
+            max: [0, 1].map(|axis| (span.max[axis] + 1).min(ends[axis])),
+        }
+    }
+
     /// Returns the bucket numbers of `span`, row by row.
     pub fn in_span(&self, span: GridSpan) -> impl Iterator<Item = usize> {
         let columns = self.columns;
@@ -79,10 +130,7 @@ impl Grid {
 
     /// Returns the rectangle of the buckets of all lattice points of `bounds`.
     pub fn span_of(&self, bounds: Bounds<2>) -> GridSpan {
-        let place = |corner: Site| {
-            let bucket = self.bucket(corner);
-            [bucket % self.columns, bucket / self.columns]
-        };
+        let place = |corner: Site| self.column_and_row(self.bucket(corner));
         GridSpan { min: place(bounds.min), max: place(bounds.max).map(|line| line + 1) }
     }
 
@@ -90,7 +138,7 @@ impl Grid {
     pub fn shared_with(&self, bounds: Bounds<2>) -> impl Iterator<Item = (usize, Bounds<2>)> {
         let span = self.span_of(bounds);
         self.in_span(span).map(move |bucket| {
-            let lines = [bucket as u32 % self.columns, bucket as u32 / self.columns];
+            let lines = self.column_and_row(bucket as u32);
             let mut shared = bounds;
             for (axis, line) in lines.into_iter().enumerate() {
                 // The outermost buckets have the points beyond the grid too.
@@ -202,6 +250,30 @@ mod tests {
         assert_eq!(grid.bucket([i32::MAX, i32::MAX]) as usize, grid.buckets() - 1);
         assert_eq!(over([3, 3], [3, 3], 100).buckets(), 1);
         assert!(over([0, 0], [1 << 30, 0], 1000).buckets() <= 1000);
+    }
+
+    #[test]
+    fn a_part_of_a_grid_has_the_same_buckets_with_other_numbers() {
+        let grid = over([-7, 3], [92, 82], 77);
+        let span = grid.span_of(Bounds { min: [10, 20], max: [60, 50] });
+        let within = grid.within(span);
+        assert_eq!(within.buckets() as u64, span.buckets());
+        for (number, bucket) in grid.in_span(span).enumerate() {
+            assert_eq!(grid.number_within(span, bucket), Some(number));
+        }
+        let inside = |bucket: usize| grid.in_span(span).any(|other| other == bucket);
+        for place in (-7..93).flat_map(|x| (3..83).map(move |y| [x, y])) {
+            let bucket = grid.bucket(place) as usize;
+            let number = inside(bucket).then(|| within.bucket(place) as usize);
+            assert_eq!(grid.number_within(span, bucket), number, "{place:?}");
+        }
+        assert!(grid.span().holds(span) && !span.holds(grid.span()) && span.joined(grid.span()) == grid.span());
+        let wider = grid.with_neighbours(span);
+        let lines = |span: GridSpan| [0, 1].map(|axis| u64::from(span.max[axis] - span.min[axis]));
+        assert_eq!(wider.buckets(), lines(span).map(|lines| lines + 2).iter().product::<u64>());
+        assert_eq!(grid.with_neighbours(grid.span()), grid.span());
+        let below = GridSpan { min: [0, 0], max: span.min };
+        assert_eq!((span.shared(below).buckets(), span.meets(below)), (0, false));
     }
 
     #[test]

@@ -20,6 +20,7 @@ use crate::plan::job_plan::Plan;
 use crate::plan::text_inputs::{allowed_malformed, stop_at};
 use crate::progress::stage::Stage;
 use crate::records::{StepRecord, Store};
+use delaunay::geometry::{Bounds, Site};
 use points::PointCounts;
 use points::options::OnBadFile;
 use rayon::prelude::*;
@@ -113,14 +114,10 @@ impl ReadBlocks {
         ColumnWriter::default().push(&self.buckets).push(&self.blocks).write(store, key)
     }
 
-    /// Returns the blocks of these buckets.
-    pub(crate) fn of(buckets: Vec<Bucket>) -> ReadBlocks {
-        let mut read = ReadBlocks::default();
-        for (number, bucket) in (0..).zip(buckets) {
-            read.blocks.extend(bucket.blocks);
-            read.buckets.resize(read.blocks.len(), number);
-        }
-        read
+    /// Adds the blocks of the bucket with this number.
+    pub(crate) fn add(&mut self, number: usize, blocks: &[PointBlock]) {
+        self.blocks.extend(blocks);
+        self.buckets.resize(self.blocks.len(), number as u32);
     }
 
     /// Returns the bytes of all blocks.
@@ -151,9 +148,10 @@ pub fn read_inputs(
     let inputs = parts.new_inputs(reader);
     let files = parts.all().map(|part| create(parts, directory, reader, part)).collect::<Result<Vec<_>>>()?;
     let file_of = |bucket: usize| files[parts.part_of(bucket).get()].as_ref();
-    let buckets = Buckets::on((0..parts.grid.buckets()).map(file_of).collect(), read_buffer_memory(&plan.options));
+    let (grid, reading) = (&parts.grid, parts.read_by(reader));
+    let buckets = Buckets::on(grid.in_span(reading).map(file_of).collect(), read_buffer_memory(&plan.options));
     let buckets = buckets.with_digests(plan.options.updates);
-    let by_input = decode(plan, inputs.iter().copied(), malformed, &parts.grid, &buckets, stage);
+    let by_input = decode(plan, inputs.iter().copied(), malformed, &grid.within(reading), &buckets, stage);
     let filled = by_input.and_then(|by_input| Ok((by_input, buckets.finish()?)));
     let (by_input, buckets) = filled.map_err(|error| match error {
         // A point lies in a part that the header does not reach.
@@ -163,7 +161,12 @@ pub fn read_inputs(
     let bad = by_input.0.iter().find(|(_, summary)| summary.counts.malformed > 0);
     let malformed = bad.map(|(input, summary)| (*input, summary.counts.clone()));
     let summary = judge(plan, by_input)?;
-    let broken = |bounds| plan.claims.is_some_and(|claims| claims.are_broken_by(bounds, summary.counts.max_rgb));
+    let broken = |bounds: Bounds<3>| {
+        let [min, max] = [bounds.min, bounds.max].map(|[x, y, _]| [x, y]);
+        // What lies beyond the buckets of these inputs went to the nearest of them.
+        !reading.holds(grid.span_of(Bounds { min, max }))
+            || plan.claims.is_some_and(|claims| claims.are_broken_by(bounds, summary.counts.max_rgb))
+    };
     if summary.bounds.is_some_and(broken) {
         return Err(crate::Error::OtherThanClaimed { is_bad_file: false });
     }
@@ -173,10 +176,11 @@ pub fn read_inputs(
     let (mut by_part, mut read) = (Vec::new(), ReadBlocks::default());
     for part in parts.all() {
         let (before, mut digest) = (read.blocks.len(), 0u64);
-        for bucket in parts.buckets_of(part) {
-            digest = digest.wrapping_add(buckets[bucket].digest);
-            read.blocks.extend(&buckets[bucket].blocks);
-            read.buckets.resize(read.blocks.len(), bucket as u32);
+        for bucket in grid.in_span(reading.shared(parts.span(part))) {
+            if let Some(found) = grid.number_within(reading, bucket).map(|number| &buckets[number]) {
+                digest = digest.wrapping_add(found.digest);
+                read.add(bucket, &found.blocks);
+            }
         }
         let blocks = &read.blocks[before..];
         if !blocks.is_empty() {
@@ -307,22 +311,27 @@ impl<'a> PointsOfPart<'a> {
         let files = PointFiles::open(&found)?.and(PointFile::create(&directory.point_file(own), own)?);
         let mut builder = TreeBuilder::new(&files, max_points_per_tile, read_buffer_memory(&plan.options));
         let read_bytes: u64 = self.blocks.iter().map(|(_, block)| block.bytes()).sum();
-        let mut buckets = vec![Bucket::default(); parts.grid.buckets()];
+        let (span, grid) = (parts.span(part), parts.grid.within(parts.span(part)));
+        let mut buckets = vec![Bucket::default(); grid.buckets()];
         for (index, block) in self.blocks {
-            let damaged = || Error::Broken(format!("a block of points belongs to bucket {index}, which there is not"));
-            let bucket = buckets.get_mut(index as usize).ok_or_else(damaged)?;
+            let damaged = || {
+                Error::Broken(format!("a block of points belongs to bucket {index}, which part {part} does not have"))
+            };
+            let number = parts.grid.number_within(span, index as usize).ok_or_else(damaged)?;
+            let bucket = &mut buckets[number];
             bucket.points += u64::from(block.points);
             bucket.blocks.push(block);
         }
         let max_rgb = plan.claims.map_or(0, |claims| claims.max_rgb);
-        let sites = Buckets::new(files.growing()?, parts.grid.buckets(), read_buffer_memory(&plan.options));
-        add_line_sites(plan, max_rgb, &parts.grid, &sites, |bucket| parts.part_of(bucket) == part)?;
+        let sites = Buckets::new(files.growing()?, grid.buckets(), read_buffer_memory(&plan.options));
+        let is_of_part = |site: Site| parts.part_of(parts.grid.bucket(site) as usize) == part;
+        add_line_sites(plan, max_rgb, &grid, &sites, is_of_part)?;
         for (bucket, sites) in buckets.iter_mut().zip(sites.finish()?) {
             bucket.points += sites.points;
             bucket.blocks.extend(sites.blocks);
         }
         let kept: u64 = buckets.iter().map(|bucket| bucket.points).sum();
-        builder.grow_root(part, parts.cell(part), &parts.grid, parts.span(part), buckets)?;
+        builder.grow_root(part, parts.cell(part), &grid, buckets)?;
         let (tree, blocks) = builder.finish();
         if tree.nodes.len() > PartIndex::STRIDE {
             return Err(Error::Config(format!(

@@ -5,7 +5,7 @@
 use crate::index::{NodeIndex, PartIndex};
 use crate::partition::grid::{Grid, GridSpan, GridSums};
 use crate::partition::tree::{Cell, NodeKind, Tree, TreeNode};
-use crate::partition::tree_builder::wanted_buckets;
+use crate::partition::tree_builder::{MAX_BUCKETS, wanted_buckets_of_job};
 use crate::plan::job_plan::Plan;
 use crate::plan::plan_cut::CutInput;
 use delaunay::geometry::Bounds;
@@ -20,22 +20,60 @@ pub struct Parts {
     part_of: Vec<PartIndex>,
     /// The buckets that each input may have points in.
     reach: Vec<GridSpan>,
-    /// The inputs that each part is the first to need.
-    new_inputs: Vec<Vec<usize>>,
+    readers: Readers,
     /// How many points each part is expected to have.
     expected: Vec<u64>,
+}
+
+/// What each part reads.
+struct Readers {
+    /// The inputs that each part is the first to need.
+    new_inputs: Vec<Vec<usize>>,
+    /// The rectangle of the buckets that these may have points in.
+    reach: Vec<Option<GridSpan>>,
+}
+
+impl Readers {
+    /// Returns what the parts with these buckets read of inputs that have points in the buckets of `reach`.
+    fn of(parts: &[GridSpan], reach: &[GridSpan]) -> Readers {
+        let mut readers = Readers { new_inputs: vec![Vec::new(); parts.len()], reach: vec![None; parts.len()] };
+        for (input, &reach) in reach.iter().enumerate() {
+            // Every bucket belongs to a part.
+            let first = parts.iter().position(|span| reach.meets(*span)).unwrap_or(0);
+            readers.new_inputs[first].push(input);
+            let joined = &mut readers.reach[first];
+            *joined = Some(joined.map_or(reach, |before| before.joined(reach)));
+        }
+        readers
+    }
+
+    /// Returns the most buckets that a part sorts points into.
+    fn most_buckets(&self) -> u64 {
+        self.reach.iter().flatten().map(|span| span.buckets()).max().unwrap_or(0)
+    }
+}
+
+/// Returns the buckets that inputs with these boxes may have points in.
+fn reach_of(grid: &Grid, claimed: impl Iterator<Item = Bounds<2>>) -> Vec<GridSpan> {
+    claimed.map(|claimed| grid.span_of(claimed)).collect()
 }
 
 impl Parts {
     /// Cuts the plane for the job of `plan`.
     pub fn of(plan: &Plan) -> Parts {
-        let triangulation = &plan.options.triangulation;
-        let cut = plan.cut();
-        let grid = Grid::over(cut.extent, wanted_buckets(cut.records, triangulation.max_points_per_tile.0));
-        let reach: Vec<GridSpan> = plan.inputs.iter().map(|input| grid.span_of(input.claimed)).collect();
-        let sums = expected_points(&grid, &cut.inputs);
-        let mut cutter = PartCutter { tree: Tree::default(), spans: Vec::new(), sums, most: plan.points_per_part() };
-        cutter.cut(Cell::PLANE, None, grid.span());
+        let (per_tile, cut) = (plan.options.triangulation.max_points_per_tile.0, plan.cut());
+        let claimed: Vec<Bounds<2>> = cut.inputs.iter().map(|input| input.claimed).collect();
+        let mut wanted = wanted_buckets_of_job(cut.records, per_tile);
+        let (grid, cutter) = loop {
+            let grid = Grid::over(cut.extent, wanted);
+            let cutter = PartCutter::cut_plane(expected_points(&grid, &cut.inputs), &grid, plan.points_per_part());
+            // Of the first run: parts do not change where files come or go.
+            let most = Readers::of(&cutter.spans, &reach_of(&grid, claimed.iter().copied())).most_buckets();
+            if most <= MAX_BUCKETS || wanted <= MAX_BUCKETS {
+                break (grid, cutter);
+            }
+            wanted = (wanted * MAX_BUCKETS / most).min(wanted - wanted / 16).max(MAX_BUCKETS);
+        };
         let PartCutter { mut tree, spans, sums, .. } = cutter;
         let expected = spans.iter().map(|&span| sums.points(span)).collect();
         // The nodes above the parts have numbers of their own.
@@ -44,13 +82,9 @@ impl Parts {
         for (part, &span) in spans.iter().enumerate() {
             grid.in_span(span).for_each(|bucket| part_of[bucket] = PartIndex::new(part));
         }
-        let mut new_inputs = vec![Vec::new(); spans.len()];
-        for (input, reach) in reach.iter().enumerate() {
-            // Every bucket belongs to a part.
-            let first = spans.iter().position(|span| reach.meets(*span)).unwrap_or(0);
-            new_inputs[first].push(input);
-        }
-        Parts { grid, tree, spans, part_of, reach, new_inputs, expected }
+        let reach = reach_of(&grid, plan.inputs.iter().map(|input| input.claimed));
+        let readers = Readers::of(&spans, &reach);
+        Parts { grid, tree, spans, part_of, reach, readers, expected }
     }
 
     /// Returns all parts in the order in which they are done.
@@ -73,9 +107,10 @@ impl Parts {
         self.spans[part.get()]
     }
 
-    /// Returns the buckets of `part`.
-    pub fn buckets_of(&self, part: PartIndex) -> impl Iterator<Item = usize> {
-        self.grid.in_span(self.span(part))
+    /// Returns the buckets that the inputs which `part` is the first to need may have points in: a rectangle around them, or around its own if
+    /// there are none. Headers may be off by a little, so it has the buckets beside these too.
+    pub fn read_by(&self, part: PartIndex) -> GridSpan {
+        self.grid.with_neighbours(self.readers.reach[part.get()].unwrap_or(self.span(part)))
     }
 
     /// Tells whether an input may have points in `part`.
@@ -102,7 +137,7 @@ impl Parts {
 
     /// Returns the inputs that may have points in `part` and in none of the parts before it.
     pub fn new_inputs(&self, part: PartIndex) -> &[usize] {
-        &self.new_inputs[part.get()]
+        &self.readers.new_inputs[part.get()]
     }
 }
 
@@ -129,6 +164,13 @@ struct PartCutter {
 }
 
 impl PartCutter {
+    /// Cuts the plane along the buckets of `grid` into parts that are expected to have at most so many points.
+    fn cut_plane(sums: GridSums, grid: &Grid, most: u64) -> PartCutter {
+        let mut cutter = PartCutter { tree: Tree::default(), spans: Vec::new(), sums, most };
+        cutter.cut(Cell::PLANE, None, grid.span());
+        cutter
+    }
+
     fn cut(&mut self, cell: Cell, parent: Option<NodeIndex>, span: GridSpan) -> NodeIndex {
         let node = NodeIndex::new(self.tree.nodes.len());
         let halves = if self.sums.points(span) > self.most { self.sums.halve(span, cell) } else { None };
@@ -145,5 +187,23 @@ impl PartCutter {
             }
         }
         node
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_input_is_read_by_the_first_part_that_it_reaches() {
+        let grid = Grid::over(Bounds { min: [0, 0], max: [99, 99] }, 100);
+        let span = |min, max| grid.span_of(Bounds { min, max });
+        let parts = [span([0, 0], [49, 99]), span([50, 0], [99, 49]), span([50, 50], [99, 99])];
+        let reach =
+            [span([60, 60], [69, 69]), span([40, 0], [59, 9]), span([0, 20], [9, 29]), span([70, 90], [99, 99])];
+        let readers = Readers::of(&parts, &reach);
+        assert_eq!(readers.new_inputs, [vec![1, 2], vec![], vec![0, 3]]);
+        assert_eq!(readers.reach, [Some(span([0, 0], [59, 29])), None, Some(span([60, 60], [99, 99]))]);
+        assert_eq!(readers.most_buckets(), 18);
     }
 }

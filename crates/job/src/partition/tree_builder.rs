@@ -12,12 +12,19 @@ use sys::{Result, interrupt};
 
 /// The number of buckets for each tile: enough that tiles come out even.
 const BUCKETS_PER_TILE: u64 = 8;
-/// With more buckets than this their buffers would be too small to write well. Crowded buckets are divided again anyway.
-const MAX_BUCKETS: u64 = 16_384;
+/// With more buckets than this at a time their buffers would be too small to write well. Crowded buckets are divided again anyway.
+pub(crate) const MAX_BUCKETS: u64 = 16_384;
+/// With more buckets than this in a job, what is known of each would take too much memory: some ten bytes.
+const MAX_BUCKETS_OF_JOB: u64 = 1 << 20;
 
-/// Returns the number of buckets for `points` points.
+/// Returns the number of buckets for `points` points that are sorted at a time.
 pub(crate) fn wanted_buckets(points: u64, max_points_per_tile: u64) -> u64 {
-    (points.saturating_mul(BUCKETS_PER_TILE) / max_points_per_tile).clamp(4, MAX_BUCKETS)
+    wanted_buckets_of_job(points, max_points_per_tile).min(MAX_BUCKETS)
+}
+
+/// Returns the number of buckets for a job of `points` points.
+pub(crate) fn wanted_buckets_of_job(points: u64, max_points_per_tile: u64) -> u64 {
+    (points.saturating_mul(BUCKETS_PER_TILE) / max_points_per_tile).clamp(4, MAX_BUCKETS_OF_JOB)
 }
 
 /// Returns the bytes of buffers for a job of `points` points, within `memory`.
@@ -40,18 +47,10 @@ impl<'a> TreeBuilder<'a> {
         TreeBuilder { files, max_points_per_tile, memory, tree: Tree::default(), blocks: Vec::new() }
     }
 
-    /// Grows the tree of `part`, which decides `cell`, over the buckets in `span` of `grid`.
-    pub(crate) fn grow_root(
-        &mut self,
-        part: PartIndex,
-        cell: Cell,
-        grid: &Grid,
-        span: GridSpan,
-        mut buckets: Vec<Bucket>,
-    ) -> Result<()> {
+    /// Grows the tree of `part`, which decides `cell`, over the buckets of `grid`.
+    pub(crate) fn grow_root(&mut self, part: PartIndex, cell: Cell, grid: &Grid, buckets: Vec<Bucket>) -> Result<()> {
         self.tree.part = part;
-        let sums = GridSums::new(*grid, buckets.iter().map(|bucket| bucket.points));
-        self.divide(cell, None, grid, &sums, &mut buckets, span).map(|_| ())
+        self.grow(cell, None, grid, buckets).map(|_| ())
     }
 
     /// Returns the tree and the blocks of each tile.

@@ -8,7 +8,7 @@ pub const BYTES_PER_LEAF_SITE: u64 = 500;
 /// The least number of bytes that a thread takes: a decoder with its chunk, a slice of points and their order.
 const BYTES_PER_THREAD: u64 = 8 << 20;
 /// The peak number of bytes that merging takes for each frontier site: edges, mesh, marks and the seam.
-pub const BYTES_PER_MERGED_SITE: u64 = 600;
+pub const BYTES_PER_MERGED_SITE: u64 = 400;
 
 /// Returns how many threads a job of `points` points uses: as many as the user wants and the memory has room for, a leaf each.
 ///

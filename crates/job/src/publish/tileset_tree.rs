@@ -58,9 +58,10 @@ impl TilesOfTree<'_> {
 
 /// Returns the node of one tile without its children, or `None` if the tile has no triangle.
 fn node(tile: &TileSummary, cell: &Cell, uri: String) -> Option<TilesetNode> {
-    let (uri, bounds) = ((tile.vertices > 0).then_some(uri), tile.bounds()?);
+    let (uri, bounds, drawn) = ((tile.vertices > 0).then_some(uri), tile.bounds()?, tile.drawn()?);
     let (error, greatest_error, middle) = (tile.error, tile.greatest_error, middle(cell, bounds));
-    Some(TilesetNode { uri, bounds, middle, error, greatest_error, transform: None, file: None, children: Vec::new() })
+    let (transform, file, children) = (None, None, Vec::new());
+    Some(TilesetNode { uri, bounds, drawn, middle, error, greatest_error, transform, file, children })
 }
 
 /// Returns the middle of the part of `bounds` in the tile's cell, or of all of it if no part is. A triangle along the hull can be as

@@ -28,7 +28,6 @@ use crate::gltf::schema::{GENERATOR, MESHOPT, QUANTIZATION, to_text};
 use crate::gltf::split_nodes::SplitNode;
 use crate::gltf::vertex_codec::encode_vertices;
 use crate::gltf::vertex_order::order_vertices;
-use delaunay::geometry::Bounds;
 use delaunay::mesh::triangle_order::TriangleSorter;
 use sys::{Error, Result};
 
@@ -119,31 +118,47 @@ impl<'a> DocumentBuilder<'a> {
     }
 
     fn add_positions(&mut self, part: &SplitNode, order: Option<&[u32]>) -> Result<Index<Accessor>> {
-        let positions = &part.tile.positions;
-        let (frame, origin) = (self.frame, part.origin);
-        let bounds = part.tile.bounds().unwrap_or(Bounds::of_point([0; 3]));
-        let extent = frame.extent_within(positions, bounds).map(|end| [0, 1, 2].map(|k| end[k] - origin[k]));
-        if self.compression == Compression::None {
-            let local = |p| frame.local(p, origin);
-            let ends = extent.map(|end| frame.metres(end).map(|v| v as f32));
-            return self.add_attribute(positions, order, local, ElementType::position(ends));
+        let frame = self.frame;
+        match &part.bent {
+            Some(places) => self.add_places(places, order, part, |steps| steps),
+            None => self.add_places(&part.tile.positions, order, part, |point| frame.flat_steps(point)),
         }
-        let steps = |p| frame.local_steps(p, origin);
+    }
+
+    /// Appends the positions of the vertices of `part`, whose glTF coordinates in steps are those of `places`.
+    fn add_places<T: Copy>(
+        &mut self,
+        places: &[T],
+        order: Option<&[u32]>,
+        part: &SplitNode,
+        steps: impl Fn(T) -> [f64; 3],
+    ) -> Result<Index<Accessor>> {
+        let (frame, origin) = (self.frame, part.origin);
+        let extent = part.extent.map(|end| [0, 1, 2].map(|k| end[k] - origin[k]));
+        if self.compression == Compression::None {
+            let local = |place| frame.local(steps(place), origin);
+            let ends = extent.map(|end| frame.metres(end).map(|v| v as f32));
+            return self.add_attribute(places, order, local, ElementType::position(ends));
+        }
+        let local = |place| {
+            let steps = steps(place);
+            [0, 1, 2].map(|k| steps[k] - origin[k])
+        };
         let element = ElementType::position(extent.map(|end| end.map(|v| v as f32)));
         if !part.short {
             let is_near = extent.as_flattened().iter().all(|v| v.abs() < EXPONENTIAL_REACH);
             if self.compression == Compression::Meshopt && is_near {
-                let convert = |p| steps(p).map(exponential);
-                return self.add_attribute(positions, order, convert, element.filtered(PackedFilter::Exponential));
+                let convert = |place| local(place).map(exponential);
+                return self.add_attribute(places, order, convert, element.filtered(PackedFilter::Exponential));
             }
-            let convert = |p| steps(p).map(|v| v as f32);
-            return self.add_attribute(positions, order, convert, element);
+            let convert = |place| local(place).map(|v| v as f32);
+            return self.add_attribute(places, order, convert, element);
         }
-        let convert = |p| {
-            let [x, y, z] = steps(p).map(|v| v as u16);
+        let convert = |place| {
+            let [x, y, z] = local(place).map(|v| v as u16);
             [x, y, z, 0]
         };
-        self.add_attribute(positions, order, convert, ElementType { component: ComponentType::U16, ..element })
+        self.add_attribute(places, order, convert, ElementType { component: ComponentType::U16, ..element })
     }
 
     fn add_normals(&mut self, normals: &[[f32; 3]], order: Option<&[u32]>) -> Result<Index<Accessor>> {

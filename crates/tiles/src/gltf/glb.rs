@@ -13,6 +13,8 @@ use sys::Result;
 pub struct GlbEncoder {
     head: Vec<u8>,
     binary: Vec<u8>,
+    /// Memory for the places of vertices in scenes that are bent.
+    steps: Vec<[f64; 3]>,
     sorters: TriangleSorters,
 }
 
@@ -29,9 +31,10 @@ impl GlbEncoder {
         compression: Compression,
         copyright: Option<&str>,
     ) -> Result<()> {
+        let steps = std::mem::take(&mut self.steps);
         let parts = match compression {
-            Compression::None => split(frame, tile)?,
-            _ => split_short(frame, tile)?,
+            Compression::None => split(frame, tile, steps)?,
+            _ => split_short(frame, tile, steps)?,
         };
         let mut document = DocumentBuilder::new(frame, compression, std::mem::take(&mut self.binary));
         for part in &parts {
@@ -41,6 +44,7 @@ impl GlbEncoder {
         let (json, binary) = document.finish(copyright)?;
         write_head(json, binary.len() as u64, &mut self.head)?;
         self.binary = binary;
+        self.steps = parts.into_iter().find_map(|part| part.bent).unwrap_or_default();
         Ok(())
     }
 

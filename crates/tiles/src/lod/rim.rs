@@ -39,9 +39,11 @@ pub(crate) fn shown(
     let border = filling.border(covers);
     let reaches = reaches(positions, outline, filling, &border.edges, places);
     let (mut mesh, number) = filling.coarse(covers);
+    let highest = positions.iter().map(|p| p[2]).max().unwrap_or(0);
     let heights: Vec<[i32; 2]> =
-        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], spare)).collect();
-    let mut fitted: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
+        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], spare, highest)).collect();
+    let before: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
+    let mut fitted = before.clone();
     let mut is_on_border = vec![false; fitted.len()];
     for &[site, _] in &border.edges {
         fitted[site as usize] = f64::from(heights[site as usize][1]);
@@ -51,12 +53,20 @@ pub(crate) fn shown(
     for _ in 0..ROUNDS {
         improve(positions, &moves, filling, places, &mut fitted)?;
     }
-    for (site, &height) in fitted.iter().enumerate() {
+    for (site, (&height, &before)) in fitted.iter().zip(&before).enumerate() {
         if let Some(position) = mesh.positions.get_mut(number[site] as usize) {
+            // In woods, what makes up for a border as high as the crowns would be a ditch.
+            let height = if moves[site] { height.clamp(before - spare, before + spare) } else { height };
             position[2] = height.round() as i32;
         }
     }
-    let bottoms = border.edges.iter().map(|&[site, _]| (number[site as usize], heights[site as usize][0])).collect();
+    let mut bottoms = Vec::with_capacity(border.edges.len());
+    for of_site in border.edges.chunk_by(|a, b| a[0] == b[0]) {
+        for (&[site, _], lower) in of_site.iter().zip(0..) {
+            // No two of a site are the same vertex.
+            bottoms.push((number[site as usize], heights[site as usize][0].saturating_sub(lower)));
+        }
+    }
     Ok(ShownMesh { mesh, bottoms, skirts: chained(&border) })
 }
 
@@ -185,9 +195,13 @@ struct Reach {
 }
 
 impl Reach {
-    /// Returns the height of the lower end of the skirt and that of the border, at a vertex that has been at `height`.
-    fn around(self, height: i32, spare: f64) -> [i32; 2] {
+    /// Returns the height of the lower end of the skirt and that of the border, at a vertex that has been at `height`. Nothing of the terrain is
+    /// above the `highest`.
+    fn around(self, height: i32, spare: f64, highest: i32) -> [i32; 2] {
         let fitted = f64::from(height);
-        [(fitted + self.below - spare).floor() as i32, (fitted + self.above).ceil() as i32]
+        let top = ((fitted + self.above).ceil() as i32).min(highest);
+        let bottom = (fitted + self.below - spare).floor() as i32;
+        // The two are different vertices.
+        [bottom.min(top.saturating_sub(1)), top]
     }
 }

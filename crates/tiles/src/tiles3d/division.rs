@@ -73,6 +73,7 @@ mod tests {
         TilesetNode {
             uri: Some(name.to_string()),
             bounds: Bounds { min: [-at; 3], max: [at; 3] },
+            drawn: Bounds { min: [-at; 3], max: [at; 3] },
             middle: [at; 2],
             error: 0.0,
             greatest_error: 0.0,
@@ -163,6 +164,7 @@ mod tests {
         assert_eq!(names.len(), 50);
         for group in &root.children {
             assert!(group.children.iter().all(|child| group.bounds.union(child.bounds) == group.bounds));
+            assert!(group.children.iter().all(|child| group.drawn.union(child.drawn) == group.drawn));
         }
     }
 }

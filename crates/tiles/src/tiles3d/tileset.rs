@@ -30,6 +30,8 @@ pub struct TilesetNode {
     pub uri: Option<String>,
     /// The box of the exact mesh below.
     pub bounds: Bounds<3>,
+    /// The box of all that is drawn of it by this tile or finer ones.
+    pub drawn: Bounds<3>,
     /// The lattice x, y of the place where its transform is exact.
     pub middle: [i32; 2],
     /// The error that viewers choose levels by, in metres.
@@ -49,10 +51,12 @@ impl TilesetNode {
     /// Returns a tile without content that holds `children` in a file of its own, or `None` without children.
     pub(super) fn group(children: Vec<TilesetNode>) -> Option<TilesetNode> {
         let bounds = children.iter().map(|child| child.bounds).reduce(Bounds::union)?;
+        let drawn = children.iter().map(|child| child.drawn).reduce(Bounds::union)?;
         let error = children.iter().map(|child| child.error).fold(0.0, f64::max);
         let middle = children.first()?.middle;
         let greatest_error = children.iter().map(|child| child.greatest_error).fold(0.0, f64::max);
-        Some(TilesetNode { uri: None, bounds, middle, error, greatest_error, transform: None, file: Some(0), children })
+        let (uri, transform, file) = (None, None, Some(0));
+        Some(TilesetNode { uri, bounds, drawn, middle, error, greatest_error, transform, file, children })
     }
 }
 
@@ -121,7 +125,7 @@ impl<E> TilesetWriter<'_, E> {
         from: &str,
     ) -> Result<(Value, MetreBounds), E> {
         let own = node.transform.as_ref();
-        let mut volume = thickened(bounds_in_metres(self.frame, node.bounds));
+        let mut volume = thickened(bounds_in_metres(self.frame, node.drawn));
         let mut children = Vec::with_capacity(node.children.len());
         for child in &node.children {
             let (child, of_child) = self.tile(child, own.or(above), from)?;
@@ -207,7 +211,7 @@ fn box_of([low, high]: MetreBounds) -> [f64; 12] {
 
 /// Returns the length of the diagonal of a tile's box in metres.
 fn diagonal(frame: &Frame, node: &TilesetNode) -> f64 {
-    let [low, high] = bounds_in_metres(frame, node.bounds);
+    let [low, high] = bounds_in_metres(frame, node.drawn);
     (0..3).map(|k| (high[k] - low[k]) * (high[k] - low[k])).sum::<f64>().sqrt().max(2.0 * LEAST_HALF)
 }
 
@@ -236,6 +240,7 @@ mod tests {
         let node = |min, max, children| TilesetNode {
             uri: None,
             bounds: Bounds { min, max },
+            drawn: Bounds { min, max },
             middle: [0; 2],
             error: 0.0,
             greatest_error: 0.0,
@@ -315,6 +320,7 @@ mod tests {
                 TilesetNode {
                     uri: Some(format!("tiles/{count}.glb")),
                     bounds: children.iter().map(|child| child.bounds).fold(own, Bounds::union),
+                    drawn: children.iter().map(|child| child.drawn).fold(own, Bounds::union),
                     middle: [*count; 2],
                     error: height as f64,
                     greatest_error: 2.0 * height as f64,

@@ -86,7 +86,7 @@ impl RemoteFile {
         let found = Arc::new(Mutex::new(None));
         let (there, asked) = (found.clone(), address.clone());
         let fetch = move || {
-            let Transferred { bytes, version } = transfer(&asked, 0..FIRST, None)?;
+            let Transferred { bytes, version } = transfer(&asked, 0..FIRST, None, Vec::new())?;
             *there.lock().unwrap_or_else(PoisonError::into_inner) = Some(version);
             Ok(bytes)
         };
@@ -165,7 +165,13 @@ impl RemoteFile {
 
     fn begin(self: &Arc<Self>, range: Range<u64>) -> Pending {
         let (file, wanted) = (self.clone(), range.clone());
-        Pending::begin(range, move || Ok(transfer(&file.address, wanted.clone(), Some(&file.version))?.bytes))
+        // Allocators keep what a thread has freed for other threads that begin later, but each thread that fetches ends soon: all of their
+        // windows together would stay. So this thread makes room.
+        let room = Mutex::new(Vec::with_capacity((range.end - range.start) as usize));
+        Pending::begin(range, move || {
+            let room = std::mem::take(&mut *room.lock().unwrap_or_else(PoisonError::into_inner));
+            Ok(transfer(&file.address, wanted.clone(), Some(&file.version), room)?.bytes)
+        })
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {

@@ -66,12 +66,15 @@ pub(crate) struct Transferred {
 }
 
 /// Fetches `range` of the file at `address`, or, if it is not yet known what `version` the file has, as much of the range as there is.
+/// The bytes take the memory of `room`.
 pub(crate) fn transfer(
     address: &Address,
     range: Range<u64>,
     version: Option<&Version>,
+    mut room: Vec<u8>,
 ) -> Result<Transferred, Failure> {
-    let mut transfer = Transfer { address, range, version: version.cloned(), bytes: Vec::new() };
+    room.clear();
+    let mut transfer = Transfer { address, range, version: version.cloned(), bytes: room };
     persist(Timeouts::standard(), version.is_some(), || {
         let before = transfer.bytes.len();
         transfer.attempt().map_err(|failure| (transfer.bytes.len() - before, failure))
