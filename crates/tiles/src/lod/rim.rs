@@ -26,7 +26,7 @@ impl ShownMesh {
 }
 
 /// Returns the triangles of `filling` that `covers` tells of, with a border that is nowhere below the `outline` of the terrain at
-/// `positions`. Skirts reach `spare` steps of z below the outline.
+/// `positions`. Skirts reach below the outline by the mean error in steps of z.
 pub(crate) fn shown(
     positions: &[[i32; 3]],
     outline: &Outline,
@@ -34,14 +34,14 @@ pub(crate) fn shown(
     covers: &[bool],
     places: &[u32],
     fixed: impl Fn(u32) -> bool,
-    spare: f64,
+    mean_error: f64,
 ) -> Result<ShownMesh> {
     let border = filling.border(covers);
     let reaches = reaches(positions, outline, filling, &border.edges, places);
     let (mut mesh, number) = filling.coarse(covers);
     let highest = positions.iter().map(|p| p[2]).max().unwrap_or(0);
     let heights: Vec<[i32; 2]> =
-        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], spare, highest)).collect();
+        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], mean_error, highest)).collect();
     let before: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
     let mut fitted = before.clone();
     let mut is_on_border = vec![false; fitted.len()];
@@ -55,8 +55,8 @@ pub(crate) fn shown(
     }
     for (site, (&height, &before)) in fitted.iter().zip(&before).enumerate() {
         if let Some(position) = mesh.positions.get_mut(number[site] as usize) {
-            // In woods, what makes up for a border as high as the crowns would be a ditch.
-            let height = if moves[site] { height.clamp(before - spare, before + spare) } else { height };
+            let most = DEEPEST * mean_error;
+            let height = if moves[site] { height.clamp(before - most, before + most) } else { height };
             position[2] = height.round() as i32;
         }
     }
@@ -69,6 +69,10 @@ pub(crate) fn shown(
     }
     Ok(ShownMesh { mesh, bottoms, skirts: chained(&border) })
 }
+
+/// How many times the mean error the heights beside the border may move. In woods, what makes up for a border as high as the crowns would
+/// be a ditch.
+const DEEPEST: f64 = 3.0;
 
 /// How often the heights beside the border move after it was raised.
 const ROUNDS: usize = 2;
