@@ -26,14 +26,14 @@ impl ShownMesh {
 }
 
 /// Returns the triangles of `filling` that `covers` tells of, with a border that is nowhere below the `outline` of the terrain at
-/// `positions`. Skirts reach below the outline by the mean error in steps of z.
+/// `positions`. Skirts reach below the outline by the mean error in steps of z. `may_move` tells which vertices of the terrain are no parts of lines.
 pub(crate) fn shown(
     positions: &[[i32; 3]],
     outline: &Outline,
     filling: &Filling,
     covers: &[bool],
     places: &[u32],
-    fixed: impl Fn(u32) -> bool,
+    may_move: impl Fn(u32) -> bool,
     mean_error: f64,
 ) -> Result<ShownMesh> {
     let border = filling.border(covers);
@@ -49,7 +49,7 @@ pub(crate) fn shown(
         fitted[site as usize] = f64::from(heights[site as usize][1]);
         is_on_border[site as usize] = true;
     }
-    let moves = beside(filling, &is_on_border, |site| !fixed(filling.vertices[site as usize]));
+    let moves = beside(filling, &is_on_border, |site| may_move(filling.vertices[site as usize]));
     for _ in 0..ROUNDS {
         improve(positions, &moves, filling, places, &mut fitted)?;
     }
