@@ -402,7 +402,7 @@ pub struct TileSummary {
 }
 
 impl TileSummary {
-    /// Returns the summary of a tile over the exact mesh within `bounds`, whose mesh has `vertices`; 0 if there is no GLB.
+    /// Returns the summary of a tile over the exact mesh within `bounds`, whose mesh has `vertices`; 0 if it has none.
     pub fn new(bounds: Option<Bounds<3>>, vertices: usize) -> TileSummary {
         let corners = bounds.map_or([[1; 3], [0; 3]], |bounds| [bounds.min, bounds.max]);
         TileSummary {

@@ -161,7 +161,7 @@ pub(crate) struct Border {
 pub struct CoarseMesh {
     /// The number in the terrain of every vertex, ascending.
     pub vertices: Vec<u32>,
-    /// The lattice integers x, y, z of every vertex. Those inside may have other heights than in the terrain.
+    /// The lattice integers x, y, z of every vertex. They may have other heights than in the terrain.
     pub positions: Vec<[i32; 3]>,
     /// The triangles, counterclockwise seen from above.
     pub triangles: Vec<[u32; 3]>,

@@ -39,9 +39,8 @@ pub(crate) fn shown(
     let border = filling.border(covers);
     let reaches = reaches(positions, outline, filling, &border.edges, places);
     let (mut mesh, number) = filling.coarse(covers);
-    let highest = positions.iter().map(|p| p[2]).max().unwrap_or(0);
     let heights: Vec<[i32; 2]> =
-        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], mean_error, highest)).collect();
+        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], mean_error)).collect();
     let before: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
     let mut fitted = before.clone();
     let mut is_on_border = vec![false; fitted.len()];
@@ -117,6 +116,7 @@ fn reaches(
 ) -> Vec<Reach> {
     let mut reaches = vec![Reach::default(); filling.positions.len()];
     let site_of = filling.numbers();
+    let highest = positions.iter().map(|p| p[2]).max().unwrap_or(0);
     let above = |v: u32| distance_above(filling, places[v as usize] as usize, positions[v as usize]);
     for ring in &outline.rings {
         let ends: Vec<(usize, u32)> = (0..ring.len())
@@ -131,7 +131,7 @@ fn reaches(
             let offset = |v: u32| Offset { share: edge.share(positions[v as usize]), above: above(v) };
             let along: Vec<Offset> = vertices.map(offset).collect();
             let mut ends = [from, to].map(|site| reaches[site as usize]);
-            raise(&mut ends, &along);
+            raise(&mut ends, edge.ends.map(|end| f64::from(highest) - f64::from(end[2])), &along);
             for (site, reach) in [from, to].into_iter().zip(ends) {
                 reaches[site as usize] = reach;
             }
@@ -140,11 +140,14 @@ fn reaches(
     reaches
 }
 
-/// Raises the ends of an edge until it is not below the vertices `along` it, and neither of them much more than it takes.
-fn raise(ends: &mut [Reach; 2], along: &[Offset]) {
+/// Raises the ends of an edge until it is not below the vertices `along` it, and neither of them much more than it takes, nor by more than
+/// `most` if the other can make up for that.
+fn raise(ends: &mut [Reach; 2], most: [f64; 2], along: &[Offset]) {
     let missing = |ends: &[Reach; 2], offset: &Offset| {
         offset.above - ends[0].above * (1.0 - offset.share) - ends[1].above * offset.share
     };
+    // Other edges may need what they have already.
+    let most = [0, 1].map(|k| ends[k].above.max(most[k]));
     for _ in 0..RAISES {
         for offset in along {
             let more = missing(ends, offset);
@@ -155,6 +158,7 @@ fn raise(ends: &mut [Reach; 2], along: &[Offset]) {
             }
         }
     }
+    ends.iter_mut().zip(most).for_each(|(end, most)| end.above = end.above.min(most));
     let more = along.iter().map(|offset| missing(ends, offset)).fold(0.0, f64::max);
     let lowest = along.iter().map(|offset| offset.above).fold(0.0, f64::min);
     for end in ends {
@@ -199,11 +203,11 @@ struct Reach {
 }
 
 impl Reach {
-    /// Returns the height of the lower end of the skirt and that of the border, at a vertex that has been at `height`. Nothing of the terrain is
-    /// above the `highest`.
-    fn around(self, height: i32, spare: f64, highest: i32) -> [i32; 2] {
+    /// Returns the height of the lower end of the skirt and that of the border, at a vertex that has been at `height`. The skirt reaches `spare`
+    /// below the outline.
+    fn around(self, height: i32, spare: f64) -> [i32; 2] {
         let fitted = f64::from(height);
-        let top = ((fitted + self.above).ceil() as i32).min(highest);
+        let top = (fitted + self.above).ceil() as i32;
         let bottom = (fitted + self.below - spare).floor() as i32;
         // The two are different vertices.
         [bottom.min(top.saturating_sub(1)), top]
