@@ -13,7 +13,7 @@ use crate::gltf::stored_normals::StoredNormals;
 use crate::lod::boundary::on_boundary;
 use crate::lod::filling::CoarseMesh;
 use crate::lod::rim::ShownMesh;
-use crate::lod::simplify::{NearBoundary, Terrain};
+use crate::lod::terrain::{NearBoundary, Terrain};
 use crate::tile::Tile;
 
 /// A vertex is at this scene position in metres, where the job's lattice has no point.

@@ -12,5 +12,6 @@ mod outline;
 mod refine;
 mod rim;
 pub mod simplify;
+pub mod terrain;
 mod vertex_cells;
 mod vertical_error;

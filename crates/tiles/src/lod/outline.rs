@@ -1,6 +1,6 @@
 //! The outline of a terrain, and those of its vertices that are enough to see it from afar.
 
-use crate::lod::simplify::{NearBoundary, Terrain};
+use crate::lod::terrain::{NearBoundary, Terrain};
 use crate::lod::vertex_cells::plane;
 use delaunay::geometry::Site;
 use delaunay::geometry::predicates::orient2d;

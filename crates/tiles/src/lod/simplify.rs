@@ -24,30 +24,12 @@ use crate::lod::outline::Outline;
 use crate::lod::refine::{Places, refine};
 pub use crate::lod::rim::ShownMesh;
 use crate::lod::rim::shown;
+use crate::lod::terrain::Terrain;
 use crate::lod::vertical_error::vertical_errors;
 use breaklines::Breaklines;
 use delaunay::geometry::Bounds;
 use delaunay::geometry::square_grid::SquareGrid;
 use sys::{Result, interrupt};
-
-/// A terrain to be simplified: a part of a Delaunay triangulation.
-pub struct Terrain<'a> {
-    /// The lattice integers x, y, z of every vertex. Each is the corner of a triangle.
-    pub positions: &'a [[i32; 3]],
-    /// The triangles, counterclockwise seen from above. They cover their ground once.
-    pub triangles: &'a [[u32; 3]],
-    /// What may be on the boundary, if that is known.
-    pub may_be_on_boundary: Option<NearBoundary<'a>>,
-}
-
-/// The surroundings of the boundary of a terrain.
-#[derive(Clone, Copy)]
-pub struct NearBoundary<'a> {
-    /// Whether a vertex may be on the boundary.
-    pub vertices: &'a [bool],
-    /// The numbers of the triangles that have such a vertex.
-    pub triangles: &'a [u32],
-}
 
 /// A simplified terrain.
 #[derive(Debug)]
