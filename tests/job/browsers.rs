@@ -293,6 +293,6 @@ fn blender_opens_the_file() {
         // Blender prints lines of its own before.
         let seen: Value = serde_json::from_str(text(&output.stdout).lines().last().unwrap()).unwrap();
         is_exact(&seen, &report, &places);
-        is_as_large(&seen, &tiles[0]);
+        is_as_large(&seen, &job, &tiles);
     }
 }
