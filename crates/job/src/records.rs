@@ -99,7 +99,7 @@ pub enum StepRecord {
     Spacing,
     /// [`LevelSummary`]
     Level(NodeIndex),
-    /// The mesh that a coarser tile has for the one above it: see `levels/level_mesh.rs`.
+    /// The working mesh of a coarser tile: see `levels/level_mesh.rs`.
     LevelMesh(NodeIndex),
     /// [`TileSummary`] of an exact tile.
     Tile(TileIndex),
@@ -388,15 +388,15 @@ pub struct TileSummary {
     pub error: f64,
     /// The greatest vertical distance to the exact mesh in metres.
     pub greatest_error: f64,
-    /// The same of the mesh that the tile above it is made from.
+    /// The same of its working mesh, which the tile above it is made from.
     pub mesh_error: f64,
     /// About the mean vertical distance to the vertices of the exact mesh in metres.
     pub typical_error: f64,
     /// The least and greatest lattice x, y, z of the exact mesh below. Without a triangle, the least are greater.
     corners: [[i32; 3]; 2],
-    /// The same of all that is drawn of it at any level up to this one.
+    /// The same of everything drawn by this tile and by those below it.
     drawn: [[i32; 3]; 2],
-    /// The vertices of the mesh that the tile above it is made from; 0 if there is none.
+    /// The vertices of its working mesh; of an exact tile, those of its GLB; 0 if there is none.
     pub vertices: u32,
     unused: u32,
 }

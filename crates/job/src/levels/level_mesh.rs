@@ -1,4 +1,4 @@
-//! What a coarser tile is made from, if it is made from coarser ones: their meshes with all vertices on the outline, which viewers do not get.
+//! The working meshes of coarser tiles: what the tile above is made from. They have all vertices on the outline, and viewers do not get them.
 
 use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::durable::packing::{pack, unpack};

@@ -102,22 +102,22 @@ pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<(LevelS
         match memory_for(&children).filter(|bytes| *bytes <= context.sizes.memory) {
             None => stats.left_out = 1,
             Some(_) => {
-                let Level { shown, surface, exact, simple } = Level::of(context, coarse.node, &children)?;
+                let Level { shown, surface, working, simple } = Level::of(context, coarse.node, &children)?;
                 let of_children =
                     |error: fn(&TileSummary) -> f64| children.iter().map(|c| error(&c.own)).fold(0.0, f64::max);
                 shown.bounds().into_iter().for_each(|bounds| own.draw(bounds));
                 // No distance is greater than the range of heights: all meshes lie within it.
                 let range = height_range(&context.style.frame, bounds.union(surface));
                 let of_meshes = of_children(|own| own.mesh_error);
-                own.mesh_error = (of_meshes + simple.exact_error).min(range);
+                own.mesh_error = (of_meshes + simple.working_error).min(range);
                 own.greatest_error = (of_meshes + simple.shown_error).min(range);
                 // What one level adds to the error has little to do with what the next one adds.
                 let before = of_children(|own| own.typical_error);
                 own.typical_error = (before * before + simple.typical_error * simple.typical_error).sqrt();
                 let seen = seen_error(simple.spacing, own.typical_error, &context.style.frame, bounds);
                 own.error = seen.max(of_children(|own| own.error));
-                own.vertices = exact.positions.len() as u32;
-                save_mesh(context.store, coarse.node, &exact)?;
+                own.vertices = working.positions.len() as u32;
+                save_mesh(context.store, coarse.node, &working)?;
                 let path = context.directory.output().level(context.part.node_number(coarse.node));
                 let written = write_glb(&path, &shown, context.style)?;
                 let triangles = shown.triangles.len() as u64;
@@ -161,7 +161,7 @@ struct Level {
     /// The box of it without its skirts.
     surface: Bounds<3>,
     /// What the tile above is made from.
-    exact: Tile,
+    working: Tile,
     /// What is known of them, without the meshes.
     simple: Simplified,
 }
@@ -182,10 +182,10 @@ impl Level {
         let terrain = joined.terrain();
         let target = context.sizes.target(terrain.triangles.len());
         let mut simple = simplify(&context.style.frame, &terrain, target, context.style.lines.as_deref())?;
-        let (shown, exact) = (std::mem::take(&mut simple.shown), std::mem::take(&mut simple.exact));
+        let (shown, working) = (std::mem::take(&mut simple.shown), std::mem::take(&mut simple.working));
         let surface = bounds_of(&shown.mesh.positions).ok_or_else(|| contradiction(node, &"nothing is left"))?;
-        let [shown, exact] = joined.tiles(shown, exact);
-        Ok(Level { shown, surface, exact, simple })
+        let [shown, working] = joined.tiles(shown, working);
+        Ok(Level { shown, surface, working, simple })
     }
 }
 

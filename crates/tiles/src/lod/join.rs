@@ -198,11 +198,11 @@ impl Joined {
         Terrain { positions: &self.positions, triangles: &self.triangles, may_be_on_boundary: Some(near) }
     }
 
-    /// Returns the tiles of two meshes between some of the vertices: what viewers get, and the `exact` one, which has all of its vertices.
+    /// Returns the tiles of two meshes between some of the vertices: what viewers get, and the `working` one, which has all of its vertices.
     /// They have normals if all tiles have them, and likewise colours and attributes.
-    pub fn tiles(&self, shown: ShownMesh, exact: CoarseMesh) -> [Tile; 2] {
-        let CoarseMesh { vertices, positions, triangles } = exact;
-        let exact = self.dressed(Tile { positions, triangles, ..Tile::default() }, &vertices);
+    pub fn tiles(&self, shown: ShownMesh, working: CoarseMesh) -> [Tile; 2] {
+        let CoarseMesh { vertices, positions, triangles } = working;
+        let working = self.dressed(Tile { positions, triangles, ..Tile::default() }, &vertices);
         let mut others = (0..).zip(&vertices);
         let numbers: Vec<u32> =
             shown.mesh.vertices.iter().filter_map(|v| others.find(|(_, other)| *other == v)).map(|(n, _)| n).collect();
@@ -211,7 +211,7 @@ impl Joined {
         let all: Vec<u32> = numbers.iter().copied().chain(tops.iter().map(|&top| numbers[top as usize])).collect();
         let mut positions = mesh.positions;
         positions.extend(shown.bottoms.iter().map(|&(top, height)| {
-            let [x, y, _] = exact.positions[numbers[top as usize] as usize];
+            let [x, y, _] = working.positions[numbers[top as usize] as usize];
             [x, y, height]
         }));
         let mut triangles = mesh.triangles;
@@ -219,7 +219,7 @@ impl Joined {
             let [from, to] = [start, end].map(|bottom| tops[bottom as usize]);
             triangles.extend([[first + start, first + end, to], [first + start, to, from]]);
         }
-        [exact.with_style_of(&all, positions, triangles), exact]
+        [working.with_style_of(&all, positions, triangles), working]
     }
 
     /// Adds to a tile what these `vertices` carry, which are its own in their order.

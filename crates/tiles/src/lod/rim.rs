@@ -1,6 +1,6 @@
-//! The border of a simplified terrain. It is coarser than the outline of the terrain, which neighbours may show in full or simplify in
-//! another way. So that no gap is seen between the two, it covers all of the terrain (`covering.rs`), is nowhere below the outline, and has a
-//! skirt that reaches below it: who looks across the outline sees one of the two surfaces or the skirt.
+//! The border of a simplified terrain. It has fewer vertices than the outline of the terrain, which neighbours may show in full or
+//! simplify in another way. So that no gap is seen between the two, it covers all of the terrain (`covering.rs`), is raised by what the outline
+//! is above the surface beside it, and has a skirt that reaches below: who looks across the outline sees one of the two surfaces or the skirt.
 
 use crate::lod::filling::{Border, CoarseMesh, Filling};
 use crate::lod::fit::{distance_above, improve};
@@ -25,8 +25,8 @@ impl ShownMesh {
     }
 }
 
-/// Returns the triangles of `filling` that `covers` tells of, with a border that is nowhere below the `outline` of the terrain at
-/// `positions`. Skirts reach below the outline by the mean error in steps of z. `may_move` tells which vertices of the terrain are no parts of lines.
+/// Returns the triangles of `filling` that `covers` tells of, with a border that is raised by what the `outline` of the terrain at `positions` is
+/// above them. Skirts reach below the outline by the mean error in steps of z. `may_move` tells which vertices of the terrain are no parts of lines.
 pub(crate) fn shown(
     positions: &[[i32; 3]],
     outline: &Outline,
@@ -125,6 +125,10 @@ fn reaches(
             .collect();
         for (k, &(first, from)) in ends.iter().enumerate() {
             let (last, to) = ends[(k + 1) % ends.len()];
+            if from == to {
+                // A single vertex has no edge beside it.
+                continue;
+            }
             let edge = BorderEdge { ends: [from, to].map(|site| filling.positions[site as usize]) };
             let count = (last + ring.len() - first) % ring.len() + 1;
             let vertices = (first..first + count).map(|at| ring[at % ring.len()]);

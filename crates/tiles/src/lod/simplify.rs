@@ -6,7 +6,7 @@
 //!
 //! - **What viewers get** has few vertices on the outline of the terrain (`outline.rs`). It covers all of the terrain and a little more, and its
 //!   border hides what neighbours may do with theirs (`rim.rs`).
-//! - **The exact mesh** is what coarser terrains are made of. It takes in all other vertices on the outline too, with their own heights,
+//! - **The working mesh** is what coarser terrains are made of. It takes in all other vertices on the outline too, with their own heights,
 //!   and ends there. The edges of the outline are edges of the triangulation of all sites of the job, and such an edge is also
 //!   an edge of the Delaunay triangulation of any subset that has both its ends, because its empty circle stays empty. So two terrains that
 //!   meet along a part of their outlines still meet there, and together they cover their ground once.
@@ -37,9 +37,9 @@ pub struct Simplified {
     /// What viewers get.
     pub shown: ShownMesh,
     /// The mesh with all vertices on the outline, which ends there.
-    pub exact: CoarseMesh,
-    /// The greatest vertical distance between the exact mesh and the original in metres.
-    pub exact_error: f64,
+    pub working: CoarseMesh,
+    /// The greatest vertical distance between the working mesh and the original in metres.
+    pub working_error: f64,
     /// The greatest vertical distance between either mesh and the original in metres.
     pub shown_error: f64,
     /// The mean vertical distance to the vertices of the original in metres.
@@ -107,13 +107,13 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
         // Nearly all triangles are slivers.
         _ => (None, Vec::new()),
     };
-    let (exact, is_new) = with_outline(positions, kept, &outline, filling, &mut places)?;
-    let shown = shown.unwrap_or_else(|| ShownMesh::without_skirts(exact.clone()));
+    let (working, is_new) = with_outline(positions, kept, &outline, filling, &mut places)?;
+    let shown = shown.unwrap_or_else(|| ShownMesh::without_skirts(working.clone()));
     interrupt::check()?;
-    let changed = changed_triangles(&shown.mesh, &exact, covers, is_new);
-    let errors = vertical_errors(positions, terrain.triangles, &outline.edges, &exact, (&shown.mesh, &changed));
-    let [exact_error, shown_error] = errors.map(|error| error * up);
-    Ok(Simplified { shown, exact, exact_error, shown_error, typical_error: typical_error * up, spacing: side * xy })
+    let changed = changed_triangles(&shown.mesh, &working, covers, is_new);
+    let errors = vertical_errors(positions, terrain.triangles, &outline.edges, &working, (&shown.mesh, &changed));
+    let [working_error, shown_error] = errors.map(|error| error * up);
+    Ok(Simplified { shown, working, working_error, shown_error, typical_error: typical_error * up, spacing: side * xy })
 }
 
 impl Simplified {
@@ -121,9 +121,9 @@ impl Simplified {
     fn unchanged(terrain: &Terrain) -> Simplified {
         let vertices = (0..terrain.positions.len() as u32).collect();
         let (positions, triangles) = (terrain.positions.to_vec(), terrain.triangles.to_vec());
-        let exact = CoarseMesh { vertices, positions, triangles };
-        let shown = ShownMesh::without_skirts(exact.clone());
-        Simplified { shown, exact, exact_error: 0.0, shown_error: 0.0, typical_error: 0.0, spacing: 0.0 }
+        let working = CoarseMesh { vertices, positions, triangles };
+        let shown = ShownMesh::without_skirts(working.clone());
+        Simplified { shown, working, working_error: 0.0, shown_error: 0.0, typical_error: 0.0, spacing: 0.0 }
     }
 }
 
@@ -164,10 +164,10 @@ fn with_outline(
     Ok((mesh, is_new))
 }
 
-/// Returns the triangles of `shown` that may not be in `exact` with the same heights. They are those of a filling that it `covers`; `is_new`
+/// Returns the triangles of `shown` that may not be in `working` with the same heights. They are those of a filling that it `covers`; `is_new`
 /// tells which of the filling have changed since.
-fn changed_triangles(shown: &CoarseMesh, exact: &CoarseMesh, covers: Vec<bool>, is_new: Vec<bool>) -> Vec<[u32; 3]> {
-    let mut others = exact.vertices.iter().zip(&exact.positions);
+fn changed_triangles(shown: &CoarseMesh, working: &CoarseMesh, covers: Vec<bool>, is_new: Vec<bool>) -> Vec<[u32; 3]> {
+    let mut others = working.vertices.iter().zip(&working.positions);
     let has_moved: Vec<bool> = shown
         .vertices
         .iter()

@@ -26,25 +26,25 @@ const MEASURED_FIRST: usize = 1024;
 /// What rounding loses of the range of heights, and more.
 const LOST: f64 = 1.0 / (1u64 << 48) as f64;
 
-/// Returns the greatest vertical distances in steps of z between a terrain and two simplified ones: to `exact`, and to the triangles of `shown` that
-/// may be `changed` from those of `exact`, or the former if that is more. They are never too small. The triangles `fine` are between
+/// Returns the greatest vertical distances in steps of z between a terrain and two simplified ones: to `working`, and to the triangles of `shown` that
+/// may be `changed` from those of `working`, or the former if that is more. They are never too small. The triangles `fine` are between
 /// `positions` (lattice x, y, z), counterclockwise, and cover their ground, which has this `outline`, once. The triangles of the
 /// simplified ones are between some of these vertices, with other heights, and cover at least the same ground.
 pub(crate) fn vertical_errors(
     positions: &[[i32; 3]],
     fine: &[[u32; 3]],
     outline: &[[u32; 2]],
-    exact: &CoarseMesh,
+    working: &CoarseMesh,
     (shown, changed): (&CoarseMesh, &[[u32; 3]]),
 ) -> [f64; 2] {
     let heights = HeightBounds::new(positions, fine);
     let range = heights.height_range();
     let fine = FineTerrain { heights: &heights, positions, triangles: fine, outline };
-    let of_exact = fine.error_of(exact, &exact.triangles, 0.0).unwrap_or(range);
-    let of_shown = fine.error_of(shown, changed, of_exact).unwrap_or(range.max(of_exact));
+    let of_working = fine.error_of(working, &working.triangles, 0.0).unwrap_or(range);
+    let of_shown = fine.error_of(shown, changed, of_working).unwrap_or(range.max(of_working));
     // Rounding loses about 2^-50 of a height.
     let lost = 1e-9 + range * LOST;
-    [of_exact, of_shown].map(|greatest| if greatest > 0.0 { (greatest + lost).min(range.max(greatest)) } else { 0.0 })
+    [of_working, of_shown].map(|greatest| if greatest > 0.0 { (greatest + lost).min(range.max(greatest)) } else { 0.0 })
 }
 
 /// The terrain before it was simplified.

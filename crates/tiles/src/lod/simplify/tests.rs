@@ -33,7 +33,7 @@ struct Simple {
     /// What viewers get, without skirts.
     surface: Tile,
     /// The mesh with the whole outline.
-    exact: Tile,
+    working: Tile,
     greatest_error: f64,
 }
 
@@ -43,10 +43,10 @@ fn simplified(tile: &Tile, triangles: usize, lines: Option<&Breaklines>) -> Simp
     joining.add_mesh(tile.clone());
     let joined = joining.finish();
     let simple = simplify(&frame, &joined.terrain(), triangles, lines).unwrap();
-    assert!(simple.exact_error <= simple.shown_error);
+    assert!(simple.working_error <= simple.shown_error);
     let surface = Tile::of(&simple.shown.mesh.positions, simple.shown.mesh.triangles.clone());
-    let [shown, exact] = joined.tiles(simple.shown, simple.exact);
-    Simple { shown, surface, exact, greatest_error: simple.shown_error }
+    let [shown, working] = joined.tiles(simple.shown, simple.working);
+    Simple { shown, surface, working, greatest_error: simple.shown_error }
 }
 
 /// Returns the edges around a tile, which is on their left.
@@ -84,8 +84,8 @@ fn a_plane_keeps_its_corners_and_has_no_error() {
     let simple = simplified(&plane, 1, None);
     assert!(simple.greatest_error < 1e-8, "{}", simple.greatest_error);
     // The 76 vertices of the boundary, and the triangles between them.
-    assert_eq!(area(&simple.exact), area(&plane));
-    assert_eq!((simple.exact.positions.len(), simple.exact.triangles.len()), (76, 74));
+    assert_eq!(area(&simple.working), area(&plane));
+    assert_eq!((simple.working.positions.len(), simple.working.triangles.len()), (76, 74));
     assert_eq!(area(&simple.surface), area(&plane));
     assert_eq!((simple.surface.positions.len(), simple.surface.triangles.len()), (4, 2));
 }
@@ -94,7 +94,7 @@ fn a_plane_keeps_its_corners_and_has_no_error() {
 fn a_tile_without_inner_vertices_stays_as_it_is() {
     let fan = terrain(vec![[0, 0, 5], [9, 0, 5], [0, 9, 1]]);
     let simple = simplified(&fan, 1, None);
-    assert_eq!((simple.shown, simple.exact, simple.greatest_error), (fan.clone(), fan, 0.0));
+    assert_eq!((simple.shown, simple.working, simple.greatest_error), (fan.clone(), fan, 0.0));
 }
 
 /// A field of points every 10 steps with a line through it, as a job makes it: near the line points are dropped.
@@ -124,13 +124,13 @@ fn breaklines_keep_their_vertices_and_stay_edges() {
     let all = lines.sites().len();
     assert_eq!(line_in(&tile, &lines), (all, true));
     let simple = |share: usize| simplified(&tile, tile.triangles.len() / share, Some(&lines));
-    for of_simple in [|simple: Simple| simple.exact, |simple: Simple| simple.surface] {
+    for of_simple in [|simple: Simple| simple.working, |simple: Simple| simple.surface] {
         assert_eq!(line_in(&of_simple(simple(5)), &lines), (all, true), "there is room for all");
         let (some, joined) = line_in(&of_simple(simple(200)), &lines);
         assert!(joined && (all / 12..all / 2).contains(&some), "{some} of {all}");
     }
-    assert_eq!(area(&simple(200).exact), area(&tile));
-    let (without, _) = line_in(&simplified(&tile, tile.triangles.len() / 5, None).exact, &lines);
+    assert_eq!(area(&simple(200).working), area(&tile));
+    let (without, _) = line_in(&simplified(&tile, tile.triangles.len() / 5, None).working, &lines);
     assert!(without < all / 2, "{without}: this test would prove nothing");
 }
 
@@ -235,14 +235,14 @@ proptest! {
     ) {
         let tile = terrain(points);
         prop_assume!(!tile.triangles.is_empty());
-        let Simple { surface, exact, greatest_error, .. } = simplified(&tile, tile.triangles.len() / share, None);
-        prop_assert_eq!(area(&exact), area(&tile));
-        prop_assert!(exact.triangles.len() <= tile.triangles.len());
-        prop_assert_eq!(outline(&exact).into_iter().collect::<HashSet<_>>(), outline(&tile).into_iter().collect());
+        let Simple { surface, working, greatest_error, .. } = simplified(&tile, tile.triangles.len() / share, None);
+        prop_assert_eq!(area(&working), area(&tile));
+        prop_assert!(working.triangles.len() <= tile.triangles.len());
+        prop_assert_eq!(outline(&working).into_iter().collect::<HashSet<_>>(), outline(&tile).into_iter().collect());
         let mut greatest = 0.0f64;
         for place in places {
             if let Some(fine) = height(&tile, place) {
-                for simple in [&surface, &exact] {
+                for simple in [&surface, &working] {
                     let coarse = height(simple, place);
                     prop_assert!(coarse.is_some(), "{:?} is not covered", place);
                     greatest = greatest.max((fine - coarse.unwrap()).abs());
