@@ -145,33 +145,35 @@ fn reaches(
 }
 
 /// Raises the ends of an edge until it is not below the vertices `along` it, and neither of them much more than it takes, nor by more than
-/// `most` if the other can make up for that.
+/// `most`: where both are as high as the terrain is anywhere, the edge hides all of it.
 fn raise(ends: &mut [Reach; 2], most: [f64; 2], along: &[Offset]) {
-    let missing = |ends: &[Reach; 2], offset: &Offset| {
-        offset.above - ends[0].above * (1.0 - offset.share) - ends[1].above * offset.share
-    };
     // Other edges may need what they have already.
     let most = [0, 1].map(|k| ends[k].above.max(most[k]));
     for _ in 0..RAISES {
         for offset in along {
-            let more = missing(ends, offset);
+            let more = offset.missing(ends);
             if more > 0.0 {
-                let weights = [1.0 - offset.share, offset.share];
+                let weights = offset.weights();
                 let square: f64 = weights.iter().map(|weight| weight * weight).sum();
                 ends.iter_mut().zip(weights).for_each(|(end, weight)| end.above += more * weight / square);
             }
         }
     }
     ends.iter_mut().zip(most).for_each(|(end, most)| end.above = end.above.min(most));
-    let more = along.iter().map(|offset| missing(ends, offset)).fold(0.0, f64::max);
-    let lowest = along.iter().map(|offset| offset.above).fold(0.0, f64::min);
-    for end in ends {
-        end.above += more;
-        end.below = end.below.min(lowest);
+    // What one end cannot do, the other one does.
+    for offset in along {
+        for k in 0..2 {
+            let (more, weight) = (offset.missing(ends), offset.weights()[k]);
+            if more > 0.0 && weight > 0.0 {
+                ends[k].above = (ends[k].above + more / weight).min(most[k]);
+            }
+        }
     }
+    let lowest = along.iter().map(|offset| offset.above).fold(0.0, f64::min);
+    ends.iter_mut().for_each(|end| end.below = end.below.min(lowest));
 }
 
-/// How often the ends of an edge are raised vertex by vertex, before both are raised by what is left.
+/// How often the ends of an edge are raised vertex by vertex, by as little as it takes.
 const RAISES: usize = 3;
 
 /// Where a vertex of the outline is along an edge of the border.
@@ -180,6 +182,19 @@ struct Offset {
     share: f64,
     /// How far the vertex is above the simplified terrain, in steps of z.
     above: f64,
+}
+
+impl Offset {
+    /// Returns how much of each end's height the place on the edge has.
+    fn weights(&self) -> [f64; 2] {
+        [1.0 - self.share, self.share]
+    }
+
+    /// Returns how much the place on the edge must rise, with its ends raised so far, until the vertex is not above it.
+    fn missing(&self, ends: &[Reach; 2]) -> f64 {
+        let [first, second] = self.weights();
+        self.above - first * ends[0].above - second * ends[1].above
+    }
 }
 
 /// An edge of the border, from one lattice point to another.
@@ -215,5 +230,34 @@ impl Reach {
         let bottom = (fitted + self.below - spare).floor() as i32;
         // The two are different vertices.
         [bottom.min(top.saturating_sub(1)), top]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// The ends of an edge are somewhat below the highest place, and vertices along it are as high as that at most.
+        #[test]
+        fn a_raised_edge_is_not_below_any_vertex(
+            fitted in prop::array::uniform2(-50.0f64..0.0),
+            before in prop::array::uniform2(0.0f64..60.0),
+            heights in prop::collection::vec((0.0f64..=1.0, -80.0f64..=0.0), 1..12),
+        ) {
+            let [from, to] = fitted;
+            let offset = |&(share, height): &(f64, f64)| Offset { share, above: height - from - share * (to - from) };
+            let along: Vec<Offset> = heights.iter().map(offset).collect();
+            let mut ends = before.map(|above| Reach { above, below: 0.0 });
+            raise(&mut ends, fitted.map(|height| -height), &along);
+            for (offset, (_, height)) in along.iter().zip(&heights) {
+                prop_assert!(offset.missing(&ends) < 1e-9, "{} at {}", offset.missing(&ends), height);
+                prop_assert!(ends.iter().all(|end| end.below <= offset.above.min(0.0)));
+            }
+            for ((end, before), height) in ends.iter().zip(before).zip(fitted) {
+                prop_assert!((before..=before.max(-height)).contains(&end.above), "{} from {}", end.above, before);
+            }
+        }
     }
 }
