@@ -8,6 +8,8 @@ const SAMPLES_PER_MESH = 2000;
 // seen then. The same rule makes preview.png. The bounds keep trees from going black, and noise from looking like hills.
 const [STEEP_SHARE, TARGET_SLOPE] = [0.7, 0.6];
 const RELIEF_BOUNDS = [0.3, 20];
+// A triangle is part of a skirt if its area in the plane is no more than this share of its area.
+const SKIRT = 1e-4;
 
 // Returns for each vertex how far the curve of the earth has moved it up, so that colours stand for heights in the source.
 function liftOf({ attributes: { position } }, toScene, georeference) {
@@ -19,20 +21,25 @@ function liftOf({ attributes: { position } }, toScene, georeference) {
   return new BufferAttribute(lifts, 1);
 }
 
-// Returns about how far the vertices of a mesh are apart in the plane, in metres, from some of its triangles. Trees and walls must not count.
-function spacingOf({ geometry: { index, attributes: { position } }, userData: { toScene } }) {
+// Yields some triangles of a mesh, but for the skirts of coarser tiles, which are vertical: the numbers of their corners, where those are in metres,
+// and twice their areas along the axes.
+function* someTriangles({ geometry: { index, attributes: { position } }, userData: { toScene } }) {
   const count = Math.floor((index ?? position).count / 3);
   const step = Math.max(1, Math.floor(count / SAMPLES_PER_MESH));
   const corners = [new Vector3(), new Vector3(), new Vector3()];
-  const areas = [];
+  const [ab, ac] = [new Vector3(), new Vector3()];
   for (let i = 0; i < count; i += step) {
-    corners.forEach((corner, k) => {
-      corner.fromBufferAttribute(position, index ? index.getX(3 * i + k) : 3 * i + k).applyMatrix4(toScene);
-    });
+    const numbers = corners.map((_, k) => (index ? index.getX(3 * i + k) : 3 * i + k));
+    corners.forEach((corner, k) => corner.fromBufferAttribute(position, numbers[k]).applyMatrix4(toScene));
     const [a, b, c] = corners;
-    areas.push(Math.abs((b.x - a.x) * (c.z - a.z) - (b.z - a.z) * (c.x - a.x)));
+    const area = ab.subVectors(b, a).cross(ac.subVectors(c, a));
+    if (Math.abs(area.y) > SKIRT * area.length()) yield { numbers, corners, area };
   }
-  return Math.sqrt(quantile(areas, 0.5));
+}
+
+// Returns about how far the vertices of a mesh are apart in the plane, in metres, from some of its triangles. Trees and walls must not count.
+function spacingOf(mesh) {
+  return Math.sqrt(quantile(Array.from(someTriangles(mesh), ({ area }) => Math.abs(area.y)), 0.5));
 }
 
 function meshesOf(scene) {
@@ -125,12 +132,9 @@ export class Dressing {
   // Returns some vertices: their heights in metres, and their colours, if they have any, as three linear values.
   samples() {
     const samples = [];
-    const vertex = new Vector3();
-    for (const { geometry, userData } of this.meshes) {
-      const { position, lift, color } = geometry.attributes;
-      const step = Math.max(1, Math.floor(position.count / SAMPLES_PER_MESH));
-      for (let i = 0; i < position.count; i += step) {
-        const { y } = vertex.fromBufferAttribute(position, i).applyMatrix4(userData.toScene);
+    for (const mesh of this.meshes) {
+      const { lift, color } = mesh.geometry.attributes;
+      for (const { numbers: [i], corners: [{ y }] } of someTriangles(mesh)) {
         samples.push({ height: y - (lift?.getX(i) ?? 0), color: color && [color.getX(i), color.getY(i), color.getZ(i)] });
       }
     }
@@ -139,20 +143,8 @@ export class Dressing {
 
   // Returns how much steeper slopes are to be lit than they are.
   relief() {
-    const slopes = [];
-    const corners = [new Vector3(), new Vector3(), new Vector3()];
-    for (const { geometry: { index, attributes: { position } }, userData } of this.meshes) {
-      const count = (index ?? position).count / 3;
-      const step = Math.max(1, Math.floor(count / SAMPLES_PER_MESH));
-      for (let i = 0; i + 1 <= count; i += step) {
-        corners.forEach((corner, k) => {
-          corner.fromBufferAttribute(position, index ? index.getX(3 * i + k) : 3 * i + k).applyMatrix4(userData.toScene);
-        });
-        const [a, b, c] = corners;
-        const { x, y, z } = b.sub(a).cross(c.sub(a));
-        if (y !== 0) slopes.push(Math.hypot(x, z) / Math.abs(y));
-      }
-    }
+    const slopesOf = (mesh) => Array.from(someTriangles(mesh), ({ area: { x, y, z } }) => Math.hypot(x, z) / Math.abs(y));
+    const slopes = [...this.meshes].flatMap(slopesOf);
     const [least, most] = RELIEF_BOUNDS;
     return Math.min(Math.max(TARGET_SLOPE / Math.max(quantile(slopes, STEEP_SHARE), 1e-6), least), most);
   }
