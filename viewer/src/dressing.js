@@ -58,6 +58,9 @@ export class Dressing {
   constructor(surface) {
     this.surface = surface;
     this.meshes = new Set();
+    // The meshes of the coarsest level that has been loaded, until they have told the heights of the whole terrain. Those of the tiles on the screen
+    // would tell others each time, as they come in another order.
+    this.coarsest = { level: Infinity, meshes: [] };
     this.showsEdges = false;
     this.hasWater = false;
     this.water = new Water();
@@ -76,7 +79,15 @@ export class Dressing {
       mesh.material = this.surface.material(mesh, toScene, levelColor);
       plain.dispose();
       Object.assign(mesh.userData, { toScene, facts });
+      this.noteCoarsest(mesh);
     }
+  }
+
+  noteCoarsest(mesh) {
+    const { level } = mesh.userData.facts;
+    if (!this.coarsest || level > this.coarsest.level) return;
+    if (level < this.coarsest.level) this.coarsest = { level, meshes: [] };
+    this.coarsest.meshes.push(mesh);
   }
 
   // Takes note of the meshes of a scene that can be shown from now on.
@@ -123,29 +134,29 @@ export class Dressing {
     shown.forEach((mesh) => mesh.add(mesh.userData.edges));
   }
 
-  // Returns the heights in metres that all but one in a hundred vertices lie between: a bird or a hole must not take the whole ramp.
-  heightRange() {
-    const heights = this.samples().map(({ height }) => height);
-    return [quantile(heights, 0.005), quantile(heights, 0.995)];
+  // Returns what the coarsest tiles tell of the whole terrain, once: the heights in metres that all but one in a hundred vertices lie between,
+  // because a bird or a hole must not take the whole ramp; how much steeper slopes are to be lit than they are; and some vertices: their heights
+  // in metres, and their colours, if they have any, as three linear values.
+  survey() {
+    const { meshes } = this.coarsest;
+    this.coarsest = null;
+    const samples = meshes.flatMap(samplesOf);
+    const heights = samples.map(({ height }) => height);
+    return { heights: [quantile(heights, 0.005), quantile(heights, 0.995)], relief: reliefOf(meshes), samples };
   }
+}
 
-  // Returns some vertices: their heights in metres, and their colours, if they have any, as three linear values.
-  samples() {
-    const samples = [];
-    for (const mesh of this.meshes) {
-      const { lift, color } = mesh.geometry.attributes;
-      for (const { numbers: [i], corners: [{ y }] } of someTriangles(mesh)) {
-        samples.push({ height: y - (lift?.getX(i) ?? 0), color: color && [color.getX(i), color.getY(i), color.getZ(i)] });
-      }
-    }
-    return samples;
-  }
+function samplesOf(mesh) {
+  const { lift, color } = mesh.geometry.attributes;
+  return Array.from(someTriangles(mesh), ({ numbers: [i], corners: [{ y }] }) => ({
+    height: y - (lift?.getX(i) ?? 0),
+    color: color && [color.getX(i), color.getY(i), color.getZ(i)],
+  }));
+}
 
-  // Returns how much steeper slopes are to be lit than they are.
-  relief() {
-    const slopesOf = (mesh) => Array.from(someTriangles(mesh), ({ area: { x, y, z } }) => Math.hypot(x, z) / Math.abs(y));
-    const slopes = [...this.meshes].flatMap(slopesOf);
-    const [least, most] = RELIEF_BOUNDS;
-    return Math.min(Math.max(TARGET_SLOPE / Math.max(quantile(slopes, STEEP_SHARE), 1e-6), least), most);
-  }
+function reliefOf(meshes) {
+  const slopesOf = (mesh) => Array.from(someTriangles(mesh), ({ area: { x, y, z } }) => Math.hypot(x, z) / Math.abs(y));
+  const slopes = meshes.flatMap(slopesOf);
+  const [least, most] = RELIEF_BOUNDS;
+  return Math.min(Math.max(TARGET_SLOPE / Math.max(quantile(slopes, STEEP_SHARE), 1e-6), least), most);
 }

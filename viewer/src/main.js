@@ -211,13 +211,11 @@ class Viewer {
     if (ground !== null && position.y < ground + above) this.orbit.rise(ground + above);
   }
 
-  // Takes what the first tiles tell for all.
+  // Takes what the coarsest tiles tell for all.
   setHeights() {
-    this.heights = this.dressing.heightRange();
-    const { shared } = this.surface;
-    shared.heightRange.value = this.heights;
-    this.relief = this.dressing.relief();
-    this.pointColors = describeColors(this.dressing.samples());
+    const { heights, relief, samples } = this.dressing.survey();
+    [this.heights, this.relief, this.pointColors] = [heights, relief, describeColors(samples)];
+    this.surface.shared.heightRange.value = heights;
     const { corners } = this.terrain;
     const width = (axis) => Math.max(...corners.map((corner) => corner[axis])) - Math.min(...corners.map((corner) => corner[axis]));
     this.usual = usualExaggeration(Math.max(width('x'), width('z')), this.heights);
