@@ -31,7 +31,12 @@ fn a_late_or_silent_gpu_changes_no_byte() {
         let figures = &report["gpu_figures"];
         let [with, without] = ["helped", "alone"].map(|kind| number(&figures[kind]));
         assert!(with < without, "{gpu}: {figures}");
-        assert_eq!(with == 0, gpu == "silent", "{figures}");
+        assert!(with == 0 || gpu != "silent", "{figures}");
         assert!(terrain(&helped) == terrain(&alone), "{gpu}, {threads} threads");
     }
+    // How many late answers a job awaits that may use a GPU depends on the load of the machine. One that must use it awaits all.
+    let helped = job(&cloud, 2).with("triangulation", "backend = \"gpu\"").variable("GDT_GPU", "slow:20");
+    let report = helped.report();
+    assert!(number(&report["gpu_figures"]["helped"]) > 0, "{}", report["gpu_figures"]);
+    assert!(terrain(&helped) == terrain(&alone), "a GPU that is required");
 }
