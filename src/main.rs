@@ -379,24 +379,30 @@ fn write_profile(terrain: &Path, lines: &Path, output: Option<&Path>, print: Pri
     }
     interrupt::listen(exit_code)?;
     let request = ProfileRequest { terrain: output_of(terrain)?, lines: lines.to_path_buf(), memory: MEMORY_FOR_LINES };
-    let profile = on_threads(threads::available(), || profile::run(&request))?;
+    let profile = profile::open(&request)?;
     if !print.quiet {
         profile.warnings.iter().for_each(|warning| say(&ShownWarning(warning).to_string()));
     }
-    match output {
-        Some(file) => write_new_table(file, &profile)?,
-        None => print_table(&profile)?,
-    }
+    on_threads(threads::available(), || match output {
+        Some(file) => write_new_table(file, &profile),
+        None => print_table(&profile),
+    })?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// Prints a table, row by row.
 fn print_table(profile: &Profile) -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    match profile.write_csv(|piece| out.write_all(piece.as_bytes())).and_then(|()| out.flush()) {
+    let mut is_closed = false;
+    let print = |piece: &str| {
+        let mut out = std::io::stdout().lock();
+        let printed = out.write_all(piece.as_bytes()).and_then(|()| out.flush());
+        is_closed = printed.as_ref().is_err_and(|error| error.kind() == ErrorKind::BrokenPipe);
+        printed.map_err(sys::Error::io("write to", sys::error::STANDARD_OUTPUT))
+    };
+    match profile.write_csv(print) {
         // The reader has closed the pipe because it has read enough.
-        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
-        outcome => Ok(outcome.map_err(sys::Error::io("write to", sys::error::STANDARD_OUTPUT))?),
+        Err(_) if is_closed => Ok(()),
+        outcome => Ok(outcome?),
     }
 }
 
@@ -410,11 +416,9 @@ fn write_new_table(file: &Path, profile: &Profile) -> Result<()> {
         );
     }
     let partial = file.with_extension("csv.partial");
-    let write = || {
-        let mut out = std::fs::File::create(&partial)?;
-        profile.write_csv(|piece| out.write_all(piece.as_bytes()))
-    };
-    write().map_err(sys::Error::io("write", &partial))?;
+    let mut out = std::fs::File::create(&partial).map_err(sys::Error::io("create", &partial))?;
+    let mut write = |piece: &str| out.write_all(piece.as_bytes()).map_err(sys::Error::io("write", &partial));
+    profile.write_csv(&mut write)?;
     std::fs::rename(&partial, file).map_err(sys::Error::io("write", file))?;
     Ok(())
 }

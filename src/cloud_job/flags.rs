@@ -17,7 +17,7 @@ pub(crate) struct Flag {
 }
 
 /// The flags that are lines of a configuration and no paths.
-const FLAGS: [Flag; 14] = [
+const FLAGS: [Flag; 15] = [
     Flag { name: "surface", table: "input", key: "surface", value: |given| text(&given.surface) },
     Flag {
         name: "bounds",
@@ -31,6 +31,7 @@ const FLAGS: [Flag; 14] = [
     Flag { name: "height-unit", table: "input", key: "height_unit", value: |given| text(&given.height_unit) },
     Flag { name: "on-bad-file", table: "input", key: "on_bad_file", value: |given| text(&given.on_bad_file) },
     Flag { name: "max-error", table: "output", key: "max_error", value: |given| given.max_error.map(Value::Float) },
+    Flag { name: "hull", table: "output", key: "hull", value: |given| text(&given.hull) },
     Flag {
         name: "height-offset",
         table: "output",
@@ -199,7 +200,7 @@ mod tests {
     fn options_in_a_text_become_flags() {
         for (said, words) in [
             ("set [input] unit = \"foot\"", "set --unit foot"),
-            ("[input] crs or [input] crs_of_all, [output] hull", "--crs or [input] crs_of_all, [output] hull"),
+            ("[input] crs or [input] crs_of_all, [output] hull", "--crs or [input] crs_of_all, --hull"),
             ("[output] raster", "--raster"),
             ("[output.raster] resolution", "[output.raster] resolution"),
         ] {

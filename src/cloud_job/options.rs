@@ -20,6 +20,9 @@ pub struct CloudOptions {
     /// Fewer triangles: keep every point within this height of the mesh, in the unit of heights.
     #[arg(long, value_name = "HEIGHT", value_parser = number, allow_negative_numbers = true)]
     pub max_error: Option<f64>,
+    /// Flat slivers between the terrain and the convex hull of all points: trimmed leaves them out, whole keeps them.
+    #[arg(long, value_name = "WHAT", value_parser = choice("[output]", "hull"))]
+    pub hull: Option<String>,
     /// Also write the heights as terrain.tif, with cells of this side, in the unit of x and y.
     #[arg(long, value_name = "SIDE", value_parser = number, allow_negative_numbers = true)]
     pub raster: Option<f64>,

@@ -73,6 +73,6 @@ fn about_option(text: &str, file: &DeTable<'_>, error: &Error) -> String {
 }
 
 /// Returns the name that a message has behind `start`.
-fn in_backticks<'a>(said: &'a str, start: &str) -> Option<&'a str> {
+pub(super) fn in_backticks<'a>(said: &'a str, start: &str) -> Option<&'a str> {
     said.strip_prefix(start)?.split('`').nth(1)
 }

@@ -4,6 +4,7 @@
 mod config_file;
 mod least;
 mod mistake;
+mod mistakes;
 pub(crate) mod nearest;
 mod option_list;
 mod paths;
@@ -15,7 +16,7 @@ mod wrong_value;
 
 use crate::config::config_file::{ConfigFile, TriangulationTable};
 use crate::config::least::refusal;
-use crate::config::mistake::explained;
+use crate::config::mistakes::all_explained;
 use crate::config::option_list::ConfigOption;
 use crate::config::paths::{Anchored, anchor, as_pattern};
 use crate::config::wrong_value::about_value;
@@ -197,7 +198,7 @@ fn parse(text: &str) -> std::result::Result<JobOptions, String> {
     if let Some(line) = text.lines().position(|line| line.contains(BRACKETS)) {
         return Err(format!("line {} has more brackets in a row than any value needs: remove them", line + 1));
     }
-    let mut file: ConfigFile = toml::from_str(text).map_err(|e| without_queries(&explained(text, &e)))?;
+    let mut file: ConfigFile = toml::from_str(text).map_err(|error| without_queries(&all_explained(text, error)))?;
     if let Some(place) = text.parse::<toml::Table>().ok().and_then(|table| nul_in(&table.into())) {
         return Err(format!("{place} has a NUL character (\\u0000), which no name of a file can have: remove it"));
     }
@@ -364,6 +365,28 @@ mod tests {
         assert!(edge.contains("line 5") && edge.contains("auto"), "{edge}");
         let points = error(&format!("{LEAST}[triangulation]\nmax_points_per_tile = 2\n"));
         assert!(points.contains("line 6") && points.contains("auto"), "{points}");
+    }
+
+    #[test]
+    fn all_mistakes_are_told_at_once() {
+        let text = "[input]\nfils = [\"a.laz\"]\nsurface = \"gorund\"\n[output]\ndirectory = \"out\"\nmax_eror = 0.1\nnormals = \"yes\"\n\
+                    [limits]\nthreads = 2\nmemry = \"4 GiB\"\n";
+        let told = error(text);
+        let lines: Vec<&str> = told.lines().filter(|line| line.starts_with("line ")).collect();
+        assert_eq!(lines.len(), 5, "{told}");
+        for (line, [place, word]) in lines.iter().zip([
+            ["line 2: [input]", "files"],
+            ["line 3: [input]", "\"ground\""],
+            ["line 6: [output]", "max_error"],
+            ["line 7: [output]", "normals"],
+            ["line 10: [limits]", "memory"],
+        ]) {
+            assert!(line.starts_with(place) && line.contains(word), "{line}");
+        }
+        // Nothing is told that only follows from another mistake.
+        let lost = error("[input]\nfiles = 3\n[output]\ndirctory = \"out\"\n");
+        assert_eq!(lost.lines().filter(|line| line.starts_with("line ")).count(), 2, "{lost}");
+        assert!(!lost.contains("has no key directory:"), "{lost}");
     }
 
     #[test]

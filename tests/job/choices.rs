@@ -98,7 +98,7 @@ fn bounds_keep_the_points_on_their_borders() {
     assert_eq!(number(&report["points"]["out_of_bounds"]), 2);
     assert_eq!(places(&tile).len(), 5);
     let nothing = Square::new().with("input", "bounds = [100, 100, 200, 200]");
-    nothing.job.run().refused(3, &["no point", "9 out of bounds", "bounds"]);
+    nothing.job.run().refused(3, &["no point", "9 outside the bounds", "bounds"]);
 }
 
 #[test]

@@ -227,11 +227,27 @@ fn files_that_are_no_area_and_areas_without_points_are_refused() {
         "far.geojson) lie in [500",
         "500600.00, 4000090.00] in WGS 84 / UTM zone 33N",
         "the inputs lie in [500000.",
-        "out of bounds",
+        "outside the bounds",
     ];
     let job = job(&cloud, &clip);
     job.run().refused(3, &told);
     job.run_with(&["check"]).refused(3, &told);
     let missing = Job::on(&[&cloud]).with("input", "crs = \"EPSG:32633\"\nclip = \"no.gpkg\"");
     missing.run().refused(2, &["[input] clip: there is no file", "no.gpkg"]);
+}
+
+#[test]
+fn a_report_says_how_much_of_the_area_is_covered_and_the_next_job_what_it_replaces() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = folder.path().join("grid.csv");
+    let rows = (0..11).flat_map(|x| (0..11).map(move |y| format!("{},{},{}\n", x * 10, y * 10, (x * y) % 5)));
+    fs::write(&cloud, format!("x,y,z\n{}", rows.collect::<String>())).unwrap();
+    let job = Job::on(&[&cloud]).with("input", "bounds = [0, 0, 250, 100]").with("output", "hull = \"whole\"");
+    let shown = job.run().succeeded();
+    assert!(shown.out.contains("covers    40 % of the bounds") && !shown.err.contains("replaces"), "{shown:?}");
+    let again = job.with("output", "normals = false").run().succeeded();
+    assert!(again.err.contains("has a terrain with other options (200 triangles): this job replaces it"), "{again:?}");
+    let (_cloud, clipped) = clipped();
+    let share = clipped.report()["covered_share"].as_f64().unwrap();
+    assert!(share > 0.5 && share < 1.0, "{share}");
 }

@@ -287,7 +287,7 @@ fn a_job_whose_points_are_all_out_of_bounds_says_where_they_lie() {
     fs::write(&cloud, "x,y,z\n1000.123,5000.5,1\n1200,5100,2\n1100,5200.987,3\n").unwrap();
     let job = |bounds: &str| Job::on(&[&cloud]).with("input", &format!("bounds = {bounds}"));
     let place = "[1000.12, 5000.50, 1200.00, 5200.99]";
-    job("[0, 0, 10, 10]").run().refused(3, &["3 out of bounds", "[0.0, 0.0, 10.0, 10.0]", place]);
+    job("[0, 0, 10, 10]").run().refused(3, &["3 outside the bounds", "[0.0, 0.0, 10.0, 10.0]", place]);
     assert!(!job("[0, 0, 10, 10]").run().err.contains("exchanged"));
     job("[5000, 1000, 5200, 1200]").run().refused(3, &[place, "x and y look exchanged"]);
     job(place).report();

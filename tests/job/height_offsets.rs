@@ -192,7 +192,7 @@ fn heights_that_may_count_from_the_sea_are_warned_of_once_they_are_on_the_globe(
     };
     let silent = write(folder.path(), "silent.las", &[code(26915)]);
     for (path, words) in
-        [(&silent, "vertical datum and unit unknown"), (&coded("navd88.las", 5703), "heights are above EPSG:5703")]
+        [(&silent, "vertical datum unknown"), (&coded("navd88.las", 5703), "heights are above EPSG:5703")]
     {
         let job = Job::on(&[path]);
         let said = warnings(&job.report());
@@ -200,7 +200,17 @@ fn heights_that_may_count_from_the_sea_are_warned_of_once_they_are_on_the_globe(
         let shown = Job::on(&[path]).run().succeeded();
         assert!(shown.out.contains(words) || shown.err.contains(words), "it is on the screen too: {shown:?}");
         for settled in ["height_offset = 0.0", "height_offset = \"egm96\"", "format = \"glb\""] {
-            assert_eq!(warnings(&Job::on(&[path]).with("output", settled).report()), "[]", "{settled}");
+            let said = warnings(&Job::on(&[path]).with("output", settled).report());
+            assert!(!said.contains("height_offset"), "{settled}: {said}");
+            // Where nothing states the unit of heights, that is told in any case.
+            let is_silent = path == silent.as_path();
+            assert_eq!(
+                said.contains("height unit unknown") && said.contains("height_unit"),
+                is_silent,
+                "{settled}: {said}"
+            );
+            let known = Job::on(&[path]).with("output", settled).with("input", "height_unit = \"metre\"");
+            assert_eq!(warnings(&known.report()), "[]", "{settled}");
         }
     }
     // The ellipsoid of WGS 84, and a plane that is nowhere.

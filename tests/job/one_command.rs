@@ -45,7 +45,7 @@ fn a_job_has_the_bytes_of_its_configuration() {
             &["my tiles/b.laz", "my tiles/Größe 1.laz", "--raster", "2", "--bounds", square, "--export", "ply,obj"],
             "my tiles-terrain",
         ),
-        (&["cloud.copc.las", "--clip", "area.geojson"], "cloud-terrain"),
+        (&["cloud.copc.las", "--clip", "area.geojson", "--hull", "whole"], "cloud-terrain"),
         (&["my tiles", "cloud.copc.las", "-o", "out/of two", "--to-crs", "EPSG:25833"], "out/of two"),
         // What the clouds need is set in both.
         (&["degrees.csv"], "degrees-terrain"),

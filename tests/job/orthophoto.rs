@@ -72,6 +72,7 @@ fn vertices_have_the_colours_of_an_orthophoto_in_any_tiles() {
     let jobs = [150, 5000].map(job);
     for job in &jobs {
         let report = job.report();
+        assert_eq!(report["vertex_colors"], "orthophoto");
         let warnings: Vec<&str> =
             report["warnings"].as_array().unwrap().iter().filter_map(|warning| warning.as_str()).collect();
         assert!(warnings.iter().any(|warning| warning.contains("400 vertices are grey, outside ")), "{warnings:?}");

@@ -119,7 +119,7 @@ fn what_the_mesh_is_stands_in_the_report_in_check_and_in_info() {
     let check = job("all").run_with(&["check"]).succeeded().out;
     assert!(check.contains(&format!("about {all}")), "{check}");
     let check = job("ground").run_with(&["check", "--json"]).succeeded().json();
-    assert_eq!(said(&check), "about 100 % ground: the mesh is bare earth");
+    assert_eq!(said(&check), "about 100 % ground by a sample: the mesh is bare earth");
     let kept = number(&check["kept"]);
     assert!((1500..2200).contains(&kept), "half of the points: {kept}");
     for (option, about) in [("--json", "about "), ("--histogram", "")] {

@@ -146,7 +146,11 @@ impl SurfaceShares {
     pub fn estimate(&self, mesh: MeshOf) -> Option<String> {
         let sentence = self.sentence(mesh)?;
         let is_share = sentence.starts_with(|c: char| c.is_ascii_digit());
-        Some(if is_share { format!("about {sentence}") } else { sentence })
+        Some(if is_share {
+            format!("about {}", sentence.replacen("ground:", "ground by a sample:", 1))
+        } else {
+            sentence
+        })
     }
 }
 

@@ -21,6 +21,16 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// Returns twice the area of all triangles in the plane, in square lattice steps. It is exact below 2^53.
+    pub fn double_area(&self) -> f64 {
+        let site = |corner: u32| self.positions[corner as usize].map(i128::from);
+        let area = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(site);
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        };
+        self.triangles.iter().map(area).sum::<i128>() as f64
+    }
+
     /// Returns the tile of these triangles between some of `positions`, without normals and colours. Vertices keep their order.
     pub fn of(positions: &[[i32; 3]], triangles: Vec<[u32; 3]>) -> Tile {
         Tile::with_vertices(positions, triangles).0

@@ -55,10 +55,10 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> crate::Error {
     };
     let outside_clip = match counts.outside_clip {
         0 => String::new(),
-        count => format!(", {count} outside clip"),
+        count => format!(", {count} outside the clip"),
     };
     crate::Error::NoTerrain(format!(
-        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}{nodata}, {} out of bounds{outside_clip}{at_breaklines}; \
+        "no point is left to triangulate: of {} read, {} are malformed, {} withheld, {} of other classes{other_returns}{nodata}, {} outside the bounds{outside_clip}{at_breaklines}; \
          {remedy}",
         counts.read, counts.malformed, counts.withheld, counts.other_class, counts.out_of_bounds
     ))

@@ -136,6 +136,17 @@ pub(crate) fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Opt
     }
 }
 
+/// Returns what the user should know about the unit of heights, if the terrain has a CRS and nothing states that unit.
+pub(crate) fn height_unit_warning(crs: &Crs) -> Option<String> {
+    (crs.name.is_some() && crs.vertical.is_none()).then(|| {
+        format!(
+            "height unit unknown: heights are taken to be in the unit of x and y ({}); fix: [input] height_unit = \"metre\", \"foot\" or \
+             \"us-foot\"",
+            crs.horizontal.name()
+        )
+    })
+}
+
 /// Returns what the user should know about the heights of a terrain on the globe, to which `offset` is added.
 pub(crate) fn heights_warning(crs: &Crs, offset: Option<&HeightOffset>) -> Option<String> {
     let from = match &crs.vertical_system {
@@ -144,18 +155,10 @@ pub(crate) fn heights_warning(crs: &Crs, offset: Option<&HeightOffset>) -> Optio
         }
         _ if offset.is_some() => return None,
         Some(system) => format!("heights are above {}", system.label()),
-        None if crs.vertical.is_none() => format!(
-            "vertical datum and unit unknown: heights are taken to be in the unit of x and y ({}), and may be above sea level",
-            crs.horizontal.name()
-        ),
         None => "vertical datum unknown: heights may be above sea level".to_string(),
-    };
-    let unit = match crs.vertical {
-        None => "; and [input] height_unit, if their unit is another one",
-        Some(_) => "",
     };
     Some(format!(
         "{from}, not the ellipsoid, so the terrain may be tens of metres too low or high on the globe; fix: [output] height_offset = \
-         \"egm96\" or a geoid grid; 0.0 if they are above the ellipsoid{unit}"
+         \"egm96\" or a geoid grid; 0.0 if they are above the ellipsoid"
     ))
 }

@@ -18,7 +18,9 @@ use crate::publish::terrain_tiles::write_terrain::TerrainStats;
 use crate::report::breakline_report::BreaklineReport;
 use crate::report::change_counts::ChangeCounts;
 use crate::report::clip_report::ClipReport;
+use crate::report::covered_share::covered_share;
 use crate::report::selection_report::SelectionReport;
+use crate::tiles::vertex_colors::ColorSource;
 use crate::tiles::write_tile::TileStats;
 use delaunay::voronoi::counts::STEP_NAMES;
 use delaunay_gpu::figures::GpuFigures;
@@ -81,6 +83,12 @@ pub struct Report {
     /// The terrain tiles for globes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub terrain: Option<TerrainStats>,
+    /// How much of the clip or the bounds the triangles cover, from 0 to 1; `None` without either.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covered_share: Option<f64>,
+    /// What gives vertices their colours.
+    #[serde(default)]
+    pub vertex_colors: ColorSource,
     /// The share of the triangles that cross a border between tiles.
     pub seam_share: f64,
     /// Points that were dropped because another has the same x and y.
@@ -246,6 +254,8 @@ pub struct ReportParts {
     pub contours: Option<ContourStats>,
     /// The terrain tiles for globes.
     pub terrain: Option<TerrainStats>,
+    /// What gives vertices their colours.
+    pub vertex_colors: ColorSource,
     /// How much an update has changed.
     pub update: Option<ChangeCounts>,
     /// The number of parts.
@@ -324,6 +334,8 @@ impl Report {
             update: parts.update,
             contours: parts.contours,
             terrain: parts.terrain,
+            covered_share: covered_share(plan, parts.tiles.double_area),
+            vertex_colors: parts.vertex_colors,
             seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
             duplicates: parts.leaves.duplicates + parts.duplicates,
             files: plan.inputs.len(),

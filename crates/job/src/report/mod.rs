@@ -3,6 +3,7 @@
 pub mod breakline_report;
 pub mod change_counts;
 pub mod clip_report;
+mod covered_share;
 pub mod job_report;
 pub mod job_status;
 pub mod selection_report;

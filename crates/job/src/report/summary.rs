@@ -42,6 +42,20 @@ impl<'a> Summary<'a> {
         )
     }
 
+    /// Returns how much of the area that the user wants is covered, if there is one.
+    fn coverage(&self) -> Option<String> {
+        let Report { covered_share, input, .. } = self.report;
+        let area = match (input.bounds.is_some(), input.clip.is_some()) {
+            (true, true) => "the clip within the bounds",
+            (true, false) => "the bounds",
+            _ => "the clip",
+        };
+        // Only what is exact says 100.
+        let share = (*covered_share)?;
+        let shown = if share < 1.0 { (share * 1000.0).floor() / 10.0 } else { 100.0 };
+        Some(format!("{shown} % of {area}"))
+    }
+
     fn exactness(&self) -> String {
         let Report { lattice, unit, selection, .. } = self.report;
         let step = match lattice.resolution == lattice.resolution_z {
@@ -63,7 +77,9 @@ impl<'a> Summary<'a> {
         let has_clip_alone = input.clip.is_some() && input.bounds.is_none();
         let outside = match has_clip_alone {
             true => [(0, ""), (points.out_of_bounds + points.outside_clip, "points outside the clip")],
-            false => [(points.out_of_bounds, "points out of bounds"), (points.outside_clip, "points outside the clip")],
+            false => {
+                [(points.out_of_bounds, "points outside the bounds"), (points.outside_clip, "points outside the clip")]
+            }
         };
         let kinds = [
             (points.withheld, "withheld points"),
@@ -137,6 +153,7 @@ impl fmt::Display for Summary<'_> {
         if let Some(surface) = &self.report.surface {
             row("surface", &(self.words)(surface))?;
         }
+        self.coverage().map_or(Ok(()), |coverage| row("covers", &coverage))?;
         row("exact", &self.exactness())?;
         self.left_out().map_or(Ok(()), |left_out| row("left out", &left_out))?;
         row("written", &self.files())?;

@@ -41,7 +41,7 @@ impl fmt::Display for Report {
         if self.points.other_return > 0 {
             row("  of other returns", grouped(self.points.other_return))?;
         }
-        let out_of_bounds = if self.clip.is_some() { "  beyond bounds, clip's box" } else { "  out of bounds" };
+        let out_of_bounds = if self.clip.is_some() { "  outside bounds, clip's box" } else { "  outside bounds" };
         row(out_of_bounds, grouped(self.points.out_of_bounds))?;
         if self.points.not_decoded > 0 {
             let why = if self.clip.is_some() { "    not decoded" } else { "    by the octree, not decoded" };

@@ -26,7 +26,7 @@ use crate::report::change_counts::ChangeCounts;
 use crate::report::job_report::Report;
 use crate::run::damage::{damaged_by_tasks, is_damage};
 use crate::run::earlier_run::{EarlierRun, RunStart, place_results_of_finished_job, start};
-use crate::run::finished::{InPlace, known_submission, results_in_place};
+use crate::run::finished::{InPlace, known_submission, replaced_terrain, results_in_place};
 use crate::run::part_entries::PartJournals;
 use crate::run::phases::do_phases;
 use crate::run::phases::plan_phase::note_skipped;
@@ -236,6 +236,9 @@ fn attempt(
         progress.note("the last run had written all its results");
         on_threads(threads, || remove_job(directory))?;
         return Ok(report);
+    }
+    if !is_by_tasks && !options.updates {
+        replaced_terrain(directory, options, &job.fingerprint)?.iter().for_each(|note| progress.note(note));
     }
     job.triangulator.prepare(plan.records, threads);
     let keeps_mesh = plan.keeps_mesh();

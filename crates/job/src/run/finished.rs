@@ -7,10 +7,12 @@ use crate::durable::journal;
 use crate::options::JobOptions;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
+use crate::progress::number_text::grouped;
 use crate::records::{JobStep, StepRecord};
 use crate::report::job_report::Report;
 use crate::run::single_process;
 use std::io::ErrorKind;
+use sys::terminal::name;
 use sys::threads::on_threads;
 use sys::{Error, Result, disk};
 use tiles::checksums::{read_file, seal};
@@ -64,6 +66,34 @@ pub(crate) fn results_in_place(
         Err(why) => return Err(why),
     };
     Ok(if is_same { InPlace::ThisJob(report.into()) } else { InPlace::OtherJob })
+}
+
+/// Says which earlier terrain the job with these `options` and the fingerprint `now` will replace; `None` if there is none, or that of the same
+/// job.
+///
+/// # Errors
+/// [`Error::Io`] if the report in place cannot be read, [`Error::Broken`] if the options have no fingerprint.
+pub(crate) fn replaced_terrain(
+    directory: &JobDirectory,
+    options: &JobOptions,
+    now: &Fingerprint,
+) -> Result<Option<String>> {
+    let path = directory.results().report();
+    let text = match read_file(&path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+        text => text.map_err(Error::io("read", &path))?,
+    };
+    let of_options = Fingerprint::of_options(options)?;
+    let report = serde_json::from_slice::<Report>(&text).ok();
+    let what = match &report {
+        None => "of another version of the program",
+        Some(report) if report.options_fingerprint != Some(of_options) => "with other options",
+        Some(report) if report.job_fingerprint != Some(now.of_job(of_options)) => "of other or changed inputs",
+        Some(_) => return Ok(None),
+    };
+    let size = report.map_or(String::new(), |report| format!(" ({} triangles)", grouped(report.triangles)));
+    let output = name(&options.output.directory);
+    Ok(Some(format!("note: {output} has a terrain {what}{size}: this job replaces it")))
 }
 
 fn are_inputs_gone(why: &Error) -> bool {

@@ -7,6 +7,7 @@ use crate::records::Leaf;
 use lattice::Lattice;
 use orthophoto::Orthophoto;
 use points::open_bytes;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use sys::{Result, Warnings};
 use tiles::color::{Coloring, LinearRgb, from_srgb};
@@ -29,6 +30,23 @@ pub(crate) enum VertexColors {
     OfPhoto(Box<PhotoColors>),
 }
 
+/// What gives vertices their colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ColorSource {
+    /// Nothing: they have none.
+    #[default]
+    None,
+    /// The colours of the points.
+    Rgb,
+    /// The heights.
+    Elevation,
+    /// The classes of the points.
+    Class,
+    /// The pixels of an orthophoto.
+    Orthophoto,
+}
+
 /// The colours of an orthophoto.
 #[derive(Debug)]
 pub(crate) struct PhotoColors {
@@ -46,6 +64,17 @@ pub(crate) struct FoundColors {
 }
 
 impl VertexColors {
+    /// Returns what gives vertices their colours.
+    pub(crate) fn source(&self) -> ColorSource {
+        match self {
+            VertexColors::None => ColorSource::None,
+            VertexColors::OfPoints(Coloring::Rgb { .. }) => ColorSource::Rgb,
+            VertexColors::OfPoints(Coloring::Elevation(_)) => ColorSource::Elevation,
+            VertexColors::OfPoints(Coloring::Class) => ColorSource::Class,
+            VertexColors::OfPhoto(_) => ColorSource::Orthophoto,
+        }
+    }
+
     /// Tells whether vertices have colours.
     pub(crate) fn are_wanted(&self) -> bool {
         !matches!(self, VertexColors::None)

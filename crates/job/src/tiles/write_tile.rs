@@ -28,6 +28,9 @@ pub struct TileStats {
     pub triangles: u64,
     /// Those of them that cross a border between tiles.
     pub seam_triangles: u64,
+    /// Twice the area of the triangles in the plane, in square lattice steps.
+    #[serde(default)]
+    pub double_area: f64,
     /// Triangles that are left out.
     pub cut_triangles: u64,
     /// Those of them that are slivers along the hull.
@@ -43,6 +46,7 @@ impl AddAssign for TileStats {
         self.files += other.files;
         self.triangles += other.triangles;
         self.seam_triangles += other.seam_triangles;
+        self.double_area += other.double_area;
         self.cut_triangles += other.cut_triangles;
         self.slivers += other.slivers;
         self.without_pixel += other.without_pixel;
@@ -74,6 +78,7 @@ pub(crate) fn write_tile(
     let kept = content.into_tile(style);
     let mut stats = TileStats {
         triangles: kept.triangles.len() as u64,
+        double_area: kept.double_area(),
         seam_triangles,
         cut_triangles: left_out.triangles.len() as u64,
         slivers,

@@ -17,7 +17,7 @@ use crate::publish::flat_tile::FlatScene;
 use crate::publish::height_offset_check::unused_height_offset;
 use crate::publish::map_tiles::write_map_tiles::{MapTileStats, MapTileWork};
 use crate::publish::one_file_limits::{fits_one_file, too_large_for_one_file};
-use crate::publish::placement::{heights_warning, place, placement_warning};
+use crate::publish::placement::{height_unit_warning, heights_warning, place, placement_warning};
 use crate::publish::raster::write_raster::{RasterStats, RasterWork};
 use crate::publish::side_files::{EachTile, SideFiles, StoredTiles, write_side_files};
 use crate::publish::terrain_tiles::write_terrain::{TerrainStats, TerrainWork};
@@ -41,7 +41,7 @@ use crate::run::phases::tile_queue::TileAppearance;
 use crate::run::update::changes::write_changes;
 use crate::run::whole_run::WholeRun;
 use crate::tiles::style::TileStyle;
-use crate::tiles::vertex_colors::{VertexColors, check_photo, without_pixel_warning};
+use crate::tiles::vertex_colors::{ColorSource, VertexColors, check_photo, without_pixel_warning};
 use crate::tiles::write_tile::TileStats;
 use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
@@ -301,6 +301,7 @@ struct Published {
     contours: Option<ContourStats>,
     exports: Vec<ExportedFile>,
     terrain: Option<TerrainStats>,
+    vertex_colors: ColorSource,
     warnings: Warnings,
 }
 
@@ -363,6 +364,7 @@ fn publish(
         text = Some((&appearance.style.frame, root));
         (placement, stats) = (placed.ok(), levels);
     }
+    warnings.extend(height_unit_warning(&plan.crs));
     warnings.extend(hull_warning(plan, written.hull));
     warnings.extend(check_photo(plan)?);
     warnings.extend(without_pixel_warning(plan, written.stats.without_pixel));
@@ -416,7 +418,17 @@ fn publish(
         bytes + rasters_and_lines + exported + classified.bytes + terrain.as_ref().map_or(0, |tiles| tiles.bytes);
     warnings.extend(exports.warnings);
     warnings.extend(classified.warnings);
-    Ok(Published { bytes, levels: stats, raster, map_tiles, contours, exports: exports.files, terrain, warnings })
+    Ok(Published {
+        bytes,
+        levels: stats,
+        raster,
+        map_tiles,
+        contours,
+        exports: exports.files,
+        terrain,
+        vertex_colors: appearance.style.colors.source(),
+        warnings,
+    })
 }
 
 /// The raster of a job.
@@ -543,6 +555,7 @@ fn write_report(
         contours: published.contours,
         exports: published.exports,
         terrain: published.terrain,
+        vertex_colors: published.vertex_colors,
         update,
         warnings: published.warnings,
         other_bytes: published.bytes + list.bytes,
