@@ -291,7 +291,7 @@ pub struct DiffOptions {
     #[arg(value_hint = ValueHint::AnyPath)]
     pub after: PathBuf,
     /// Ignore height changes smaller than this, in units of the heights. Default: 0.
-    #[arg(long, value_name = "HEIGHT", default_value_t = 0.0, hide_default_value = true, value_parser = threshold)]
+    #[arg(long, value_name = "HEIGHT", default_value_t = 0.0, hide_default_value = true, value_parser = threshold, allow_negative_numbers = true)]
     pub threshold: f64,
     /// Also report each polygon of this GeoJSON, GeoPackage or Shapefile, by its attribute "name".
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
@@ -300,10 +300,10 @@ pub struct DiffOptions {
     #[arg(long, short, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub output: Option<PathBuf>,
     /// Cell size of the raster, in units of x and y. Default: about the point spacing of the finer terrain.
-    #[arg(long, value_name = "LENGTH", requires = "output", value_parser = length)]
+    #[arg(long, value_name = "LENGTH", requires = "output", value_parser = length, allow_negative_numbers = true)]
     pub resolution: Option<f64>,
     /// The change with the strongest colours, in units of the heights. Default: a round number above 98 % of all changes.
-    #[arg(long, value_name = "HEIGHT", requires = "output", value_parser = length)]
+    #[arg(long, value_name = "HEIGHT", requires = "output", value_parser = length, allow_negative_numbers = true)]
     pub range: Option<f64>,
     /// The memory that diff may use, such as "4 GiB".
     #[arg(long, default_value = "4 GiB", value_parser = memory)]

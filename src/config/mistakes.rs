@@ -4,6 +4,7 @@ use crate::config::config_file::ConfigFile;
 use crate::config::mistake::{explained, in_backticks};
 use crate::config::option_list::ConfigOption;
 use crate::config::place::Place;
+use crate::config::wrong_name::line_meant;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Error};
@@ -19,20 +20,27 @@ struct Blank {
 
 /// Returns what is wrong with the text, of which the parser has said `first`: one message for each mistake.
 pub(crate) fn all_explained(text: &str, first: Error) -> String {
-    let mut told = vec![explained(text, &first)];
+    let mut told = vec![message(text, &first)];
     let (mut rest, mut error, mut blanks) = (text.to_string(), first, Vec::new());
     while told.len() < MOST {
         let Some((next, blank)) = without_mistake(&rest, &error) else { break };
         rest = next;
         blanks.push(blank);
         let Some(found) = next_mistake(&mut rest, &mut blanks) else { break };
-        told.push(explained(&rest, &found));
+        told.push(message(&rest, &found));
         error = found;
     }
-    told.join("\n")
+    told.sort_by_key(|(line, _)| *line);
+    told.into_iter().map(|(_, message)| message).collect::<Vec<_>>().join("\n")
 }
 
-/// Returns the text without the entry that the error is about; `None` if that is no single entry, or the rest cannot be read.
+/// Returns what is wrong with a text, and the line.
+fn message(text: &str, error: &Error) -> (usize, String) {
+    let start = error.span().map_or(0, |span| span.start);
+    (text.get(..start).unwrap_or_default().matches('\n').count(), explained(text, error))
+}
+
+/// Returns the text without the entry that the error is about, or with the option in its place that the user may have meant; `None` if that is no single entry, or the rest cannot be read.
 fn without_mistake(text: &str, error: &Error) -> Option<(String, Blank)> {
     if ["missing field", "duplicate field"].iter().any(|kind| error.message().starts_with(kind)) {
         return None;
@@ -40,12 +48,15 @@ fn without_mistake(text: &str, error: &Error) -> Option<(String, Blank)> {
     let span = error.span()?;
     let (file, wrong) = DeTable::parse_recoverable(text);
     let entry = entry_at(file.get_ref(), span.start).filter(|_| wrong.is_empty())?;
-    let table = Place::of(text, file.get_ref(), &span).table;
-    let blanked = text.get(entry.clone())?.bytes().map(|byte| if byte == b'\n' { '\n' } else { ' ' });
-    let rest: String = text.get(..entry.start)?.chars().chain(blanked).chain(text.get(entry.end..)?.chars()).collect();
-    // A comma that is left over in an inline table is no mistake of the user.
-    let is_whole = DeTable::parse_recoverable(&rest).1.is_empty();
-    is_whole.then_some((rest, Blank { table, at: entry.start }))
+    let Place { table, key, .. } = Place::of(text, file.get_ref(), &span);
+    let is_unknown = error.message().starts_with("unknown field");
+    let meant = key.filter(|_| is_unknown).and_then(|key| line_meant(&table, &key)).unwrap_or_default();
+    let [before, wrong, after] = [text.get(..entry.start)?, text.get(entry.clone())?, text.get(entry.end..)?];
+    let blanks: String = wrong.bytes().map(|byte| if byte == b'\n' { '\n' } else { ' ' }).collect();
+    // An option that is set already, and a comma that is left over in an inline table, are no mistakes of the user.
+    let texts = [meant.as_str(), ""].into_iter().map(|line| format!("{before}{line}{blanks}{after}"));
+    let rest = texts.into_iter().find(|text| DeTable::parse_recoverable(text).1.is_empty())?;
+    Some((rest, Blank { table, at: entry.start }))
 }
 
 /// Returns where the innermost entry stands that is at byte `at`: from its key to the end of its value. A table with a header is none.

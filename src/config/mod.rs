@@ -383,6 +383,8 @@ mod tests {
         ]) {
             assert!(line.starts_with(place) && line.contains(word), "{line}");
         }
+        let inner = error(&LEAST.replace("[output]", "[output.contours]\nintervall = 1.0\n[output]\nmax_eror = 1"));
+        assert_eq!(inner.lines().filter(|line| line.starts_with("line ")).count(), 2, "{inner}");
         // Nothing is told that only follows from another mistake.
         let lost = error("[input]\nfiles = 3\n[output]\ndirctory = \"out\"\n");
         assert_eq!(lost.lines().filter(|line| line.starts_with("line ")).count(), 2, "{lost}");

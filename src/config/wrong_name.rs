@@ -37,6 +37,12 @@ fn about_key(table: &str, name: &str, value: Option<&Value>) -> String {
     }
 }
 
+/// Returns an example of the option of a table that the user may have meant by a name.
+pub(crate) fn line_meant(table: &str, name: &str) -> Option<String> {
+    let own: Vec<ConfigOption> = options().into_iter().filter(|option| option.table == table).collect();
+    nearest_option(name, &own).map(ConfigOption::line)
+}
+
 /// Returns what is wrong with a key above all tables.
 fn about_lost_key(name: &str) -> String {
     let lost = format!("{name} is in no table");

@@ -138,7 +138,8 @@ pub(crate) fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Opt
 
 /// Returns what the user should know about the unit of heights, if the terrain has a CRS and nothing states that unit.
 pub(crate) fn height_unit_warning(crs: &Crs) -> Option<String> {
-    (crs.name.is_some() && crs.vertical.is_none()).then(|| {
+    let is_unknown = crs.vertical.is_none() && !crs.has_ellipsoidal_heights();
+    (crs.name.is_some() && is_unknown).then(|| {
         format!(
             "height unit unknown: heights are taken to be in the unit of x and y ({}); fix: [input] height_unit = \"metre\", \"foot\" or \
              \"us-foot\"",
