@@ -327,7 +327,7 @@ fn exchanged_coordinates_that_lie_beside_the_zone_are_known_too() {
         refused.refused(3, &[name, "with x and y exchanged, they lie near it: [input.csv] columns"]);
     }
     let lecce = csv(&folder, "lecce.csv", [1_279_470.0, 4_507_360.0], 7.0);
-    let said = warnings(&Job::on(&[&lecce]).with("input", "crs = \"EPSG:32632\"\nheight_unit = \"metre\"").report());
+    let said = warnings(&Job::on(&[&lecce]).with("input", "crs = \"EPSG:32632\"").report());
     assert!(said.contains("Nothing, if the CRS and the coordinates are right") && !said.contains("foot"), "{said}");
 }
 

@@ -213,7 +213,7 @@ fn texts_without_codes_whose_datums_differ_are_refused_unless_the_user_says_whic
         job.verified();
     }
     let coded = write(folder.path(), "coded.las", &[code(26915)]);
-    assert_eq!(warnings(&ellipsoidal(&[&new, &coded]).with("input", "height_unit = \"metre\"").report()), "[]");
+    assert_eq!(warnings(&ellipsoidal(&[&new, &coded]).report()), "[]");
     Job::on(&[&old, &coded]).run().refused(2, &["the datum (", "NAD83"]);
 }
 
@@ -227,7 +227,7 @@ fn user_defined_keys_are_compared_with_codes() {
         [("nad83.las", 4269), ("nad27.las", 4267)].map(|(name, datum)| write(folder.path(), name, &[defined(datum)]));
     let [utm15, utm16] =
         [("15.las", 26915), ("16.las", 26916)].map(|(name, utm)| write(folder.path(), name, &[code(utm)]));
-    assert_eq!(warnings(&ellipsoidal(&[&nad83, &utm15]).with("input", "height_unit = \"metre\"").report()), "[]");
+    assert_eq!(warnings(&ellipsoidal(&[&nad83, &utm15]).report()), "[]");
     Job::on(&[&nad27, &utm15]).run().refused(2, &["nad27.las", "15.las", "the datum (", "NAD27", "NAD83"]);
     Job::on(&[&nad83, &utm16]).run().refused(2, &["nad83.las", "16.las", "longitude of the origin (", "-93", "-87"]);
 }
@@ -363,8 +363,8 @@ fn nad83_2011_by_parameters_is_placed_on_the_globe() {
     let folder = tempfile::tempdir().unwrap();
     let file = write(folder.path(), "new.las", &[text(&esri("NAD_1983_2011", GRS80))]);
     let coded = write(folder.path(), "coded.las", &[code(6344)]);
-    assert_eq!(warnings(&ellipsoidal(&[&file, &coded]).with("input", "height_unit = \"metre\"").report()), "[]");
-    assert_eq!(warnings(&ellipsoidal(&[&file]).with("input", "height_unit = \"metre\"").report()), "[]");
+    assert_eq!(warnings(&ellipsoidal(&[&file, &coded]).report()), "[]");
+    assert_eq!(warnings(&ellipsoidal(&[&file]).report()), "[]");
     let Some(shared) = shared() else { return };
     let real = ellipsoidal(&[shared.join("data/file_with_both_wkt_and_geotiff_vlrs.las")]).report();
     assert!(!warnings(&real).contains("globe"), "{real}");

@@ -5,6 +5,7 @@ use crate::tiles::curve::{ONE_TRANSFORM, ONE_TRANSFORM_SIDEWAYS};
 use crs::Crs;
 use crs::geoid::Geoid;
 use crs::geoid::option::HeightOffset;
+use crs::unit::Unit;
 use crs::vertical::VerticalSystem;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -136,9 +137,10 @@ pub(crate) fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Opt
     }
 }
 
-/// Returns what the user should know about the unit of heights, if the terrain has a CRS and nothing states that unit.
+/// Returns what the user should know about the unit of heights, if the terrain has a CRS and nothing states that unit. Beside metres heights
+/// are in metres, but beside feet either is common.
 pub(crate) fn height_unit_warning(crs: &Crs) -> Option<String> {
-    let is_unknown = crs.vertical.is_none() && !crs.has_ellipsoidal_heights();
+    let is_unknown = crs.vertical.is_none() && !crs.has_ellipsoidal_heights() && crs.horizontal != Unit::Metre;
     (crs.name.is_some() && is_unknown).then(|| {
         format!(
             "height unit unknown: heights are taken to be in the unit of x and y ({}); fix: [input] height_unit = \"metre\", \"foot\" or \

@@ -50,7 +50,7 @@ impl<'a> Summary<'a> {
             (true, false) => "the bounds",
             _ => "the clip",
         };
-        // Only what is exact says 100.
+        // 100 % is shown only where it is exact.
         let share = (*covered_share)?;
         let shown = if share < 1.0 { (share * 1000.0).floor() / 10.0 } else { 100.0 };
         Some(format!("{shown} % of {area}"))
