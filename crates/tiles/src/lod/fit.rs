@@ -2,15 +2,29 @@
 
 use crate::lod::filling::Filling;
 use crate::lod::refine::Places;
+use crate::lod::terrain::Terrain;
 use crate::lod::vertex_cells::plane;
 use delaunay::geometry::predicates::orient2d;
 use sys::{Result, interrupt};
 
 /// How often all heights move. Each further time would change them by a few hundredths of the error.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 3;
 
-/// Moves the heights of `filling` that are not `fixed` towards the least squares of the vertical distances to the terrain at `positions`.
-/// Returns the mean of the distances in steps of z, as they are before the heights move the last time.
+/// Returns the area of the triangles around each vertex of a terrain, six times that of its share of the ground.
+pub(crate) fn areas(terrain: &Terrain) -> Vec<f64> {
+    let mut areas = vec![0.0; terrain.positions.len()];
+    for corners in terrain.triangles {
+        let [a, b, c] = corners.map(|v| plane(terrain.positions[v as usize]));
+        let double_area = orient2d(a, b, c) as f64;
+        corners.iter().for_each(|&v| areas[v as usize] += double_area);
+    }
+    areas
+}
+
+/// Moves the heights of `filling` that are not `fixed` towards the least squares of the vertical distances to the vertices of a terrain. Each
+/// has the weight of its share of the ground, `areas`: vertices of a level are dense where much stands out, so without weights
+/// each level of a wood would be higher than the one before. Returns the mean of the distances in steps of z, as they are
+/// before the heights move the last time.
 ///
 /// # Errors
 /// [`sys::Error::Interrupted`].
@@ -19,13 +33,14 @@ pub(crate) fn fit(
     fixed: impl Fn(u32) -> bool,
     filling: &mut Filling,
     places: &mut Places,
+    areas: &[f64],
 ) -> Result<f64> {
     let located = places.locate_all(filling);
     let mut error = 0.0;
     let mut heights: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
     let moves: Vec<bool> = filling.vertices.iter().map(|&v| !fixed(v)).collect();
     for _ in 0..ROUNDS {
-        error = improve(positions, &moves, filling, located, &mut heights)?;
+        error = improve(positions, &moves, filling, located, areas, &mut heights)?;
     }
     let rounded = rounded(positions, &heights);
     filling.positions.iter_mut().zip(rounded).for_each(|(p, height)| p[2] = height);
@@ -39,7 +54,7 @@ fn rounded(positions: &[[i32; 3]], heights: &[f64]) -> impl Iterator<Item = i32>
     heights.iter().map(move |height| (height.round() as i32).clamp(low, high))
 }
 
-/// Moves those `heights` of `filling` once that may move. `located` has the triangle around each of `positions`. Returns the mean of
+/// Moves those `heights` of `filling` once that may move. `located` has the triangle around each of `positions`, and `areas` its weight. Returns the mean of
 /// the distances before, in the triangles with a height that may move.
 ///
 /// # Errors
@@ -49,13 +64,14 @@ pub(crate) fn improve(
     moves: &[bool],
     filling: &Filling,
     located: &[u32],
+    areas: &[f64],
     heights: &mut [f64],
 ) -> Result<f64> {
     interrupt::check()?;
     // For every vertex the sum of the weights, and that of the distances times their weights.
     let mut sums = vec![[0.0; 2]; heights.len()];
     let (mut total, mut count) = (0.0, 0);
-    for (&triangle, &p) in located.iter().zip(positions) {
+    for ((&triangle, &p), &area) in located.iter().zip(positions).zip(areas) {
         let corners = filling.corners(triangle as usize);
         if !corners.iter().any(|&site| moves[site as usize]) {
             continue;
@@ -67,8 +83,8 @@ pub(crate) fn improve(
         count += 1;
         for (&site, weight) in corners.iter().zip(weights) {
             let [of_weights, of_distances] = &mut sums[site as usize];
-            *of_weights += weight;
-            *of_distances += weight * distance;
+            *of_weights += area * weight;
+            *of_distances += area * weight * distance;
         }
     }
     for ((height, [of_weights, of_distances]), moves) in heights.iter_mut().zip(&sums).zip(moves) {
@@ -97,6 +113,9 @@ fn weights(corners: [[i32; 2]; 3], p: [i32; 2]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Areas of the points of a [`Square`] that are all equal.
+    const EQUAL: [f64; 2_500] = [1.0; 2_500];
 
     /// A lattice of 50 by 50 points, of which the outermost and every seventh are kept.
     struct Square {
@@ -132,7 +151,7 @@ mod tests {
         let mut places = Places::new(&square.terrain, &filling);
         let squares = |distances: Vec<f64>| distances.iter().map(|d| d * d).sum::<f64>();
         let before = squares(square.distances(&filling, &mut places));
-        let mean = fit(&square.terrain, |v| v.is_multiple_of(70), &mut filling, &mut places).unwrap();
+        let mean = fit(&square.terrain, |v| v.is_multiple_of(70), &mut filling, &mut places, &EQUAL).unwrap();
         let after = squares(square.distances(&filling, &mut places));
         assert!(after < 0.85 * before, "{after} of {before}");
         assert!((10.0..60.0).contains(&mean), "{mean}");
@@ -147,10 +166,23 @@ mod tests {
             let square = Square::new(|x, _| sign * (1_000 * (x % 2) - 500));
             let mut filling = Filling::new(&square.terrain, &square.kept).unwrap();
             let mut places = Places::new(&square.terrain, &filling);
-            fit(&square.terrain, |_| false, &mut filling, &mut places).unwrap();
+            fit(&square.terrain, |_| false, &mut filling, &mut places, &EQUAL).unwrap();
             let distances = square.distances(&filling, &mut places);
             let mean = distances.iter().sum::<f64>() / distances.len() as f64;
             assert!(mean.abs() < 10.0, "{mean} of 500");
         }
+    }
+
+    /// Far more points stand out than others, but on a tenth of the ground.
+    #[test]
+    fn what_covers_little_ground_weighs_little() {
+        let square = Square::new(|x, _| if x % 10 == 0 { 0 } else { 1_000 });
+        let areas: Vec<f64> = (0..2_500).map(|i| if i % 10 == 0 { 81.0 } else { 1.0 }).collect();
+        let mut filling = Filling::new(&square.terrain, &square.kept).unwrap();
+        let mut places = Places::new(&square.terrain, &filling);
+        fit(&square.terrain, |_| false, &mut filling, &mut places, &areas).unwrap();
+        let distances = square.distances(&filling, &mut places);
+        let mean = distances.iter().zip(&areas).map(|(d, area)| d * area).sum::<f64>() / areas.iter().sum::<f64>();
+        assert!(mean.abs() < 50.0, "{mean} of 1000");
     }
 }

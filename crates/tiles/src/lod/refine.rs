@@ -6,8 +6,9 @@ use crate::lod::filling::Filling;
 use crate::lod::vertex_cells::vertical_distance;
 use sys::{Result, interrupt};
 
-/// The rounds: each looks at one of this many vertices. The first rounds choose few.
-const LOOKED_AT: [usize; 4] = [8, 4, 2, 2];
+/// The rounds: each looks at one of this many vertices. The first rounds choose few. The last ones are for places where many vertices stand
+/// out of one triangle, of which a round takes in one.
+const LOOKED_AT: [usize; 6] = [8, 4, 2, 1, 1, 1];
 
 /// Steps of the walks to the vertices, on average, before the search gives up. Terrains need far fewer.
 const STEPS_PER_VERTEX: u64 = 64;
@@ -68,57 +69,92 @@ pub(crate) fn refine(
     places: &mut Places,
     wanted: usize,
 ) -> Result<()> {
+    let mut furthest = Furthest::default();
     for (round, every) in LOOKED_AT.into_iter().enumerate() {
         interrupt::check()?;
         let has = filling.vertices.len();
         // Not `powf`, whose last digit may differ between machines.
         let growth = libm::pow(wanted as f64 / has as f64, 1.0 / (LOOKED_AT.len() - round) as f64);
         let count = ((has as f64 * growth).round() as usize).min(wanted).saturating_sub(has);
-        for far in furthest(positions, kept, &allows, filling, places, (round % every, every), count) {
+        furthest.look(positions, |v| !kept[v] && allows(v), filling, places, every);
+        for far in furthest.of_all(count) {
             kept[far.vertex as usize] = true;
-            places.insert(far.vertex, filling, |_| {});
+            places.insert(far.vertex, filling, |triangle| furthest.note_change(triangle));
         }
     }
     Ok(())
 }
 
 /// A vertex that is over or under a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct FarVertex {
     /// The vertical distance in steps of z.
     distance: f64,
     vertex: u32,
 }
 
-/// Returns of every triangle the furthest vertex among those that are looked at, and of these the `count` that are furthest, in
-/// ascending order.
-fn furthest(
-    positions: &[[i32; 3]],
-    kept: &[bool],
-    allows: impl Fn(usize) -> bool,
-    filling: &Filling,
-    places: &mut Places,
-    (first, every): (usize, usize),
-    count: usize,
-) -> Vec<FarVertex> {
-    let mut furthest = vec![FarVertex { distance: 0.0, vertex: 0 }; filling.triangles()];
-    for v in (first..positions.len()).step_by(every).filter(|&v| !kept[v]) {
-        let Some(triangle) = places.locate(v as u32, filling) else { break };
-        let corners = filling.corners(triangle);
-        let distance = vertical_distance(&corners.map(|site| filling.positions[site as usize]), positions[v]);
-        if distance > furthest[triangle].distance && allows(v) {
-            furthest[triangle] = FarVertex { distance, vertex: v as u32 };
+/// The furthest vertex of every triangle. Those of triangles that have not changed stay known.
+#[derive(Default)]
+struct Furthest {
+    of_triangles: Vec<FarVertex>,
+    has_changed: Vec<bool>,
+    /// Of how many vertices the last look took one; 0 before the first look.
+    last_every: usize,
+}
+
+impl Furthest {
+    /// Looks at one of `every` vertices, among them all that were looked at before, as far as it `may_choose` them.
+    fn look(
+        &mut self,
+        positions: &[[i32; 3]],
+        may_choose: impl Fn(usize) -> bool,
+        filling: &Filling,
+        places: &mut Places,
+        every: usize,
+    ) {
+        if every != self.last_every {
+            self.has_changed.fill(true);
+        }
+        self.has_changed.resize(filling.triangles(), true);
+        self.of_triangles.resize(filling.triangles(), FarVertex::default());
+        for (far, _) in self.of_triangles.iter_mut().zip(&self.has_changed).filter(|(_, has_changed)| **has_changed) {
+            *far = FarVertex::default();
+        }
+        for v in (0..positions.len()).step_by(every) {
+            // Where this is not yet the triangle of the vertex, all have changed.
+            if !self.has_changed[places.triangles[v] as usize] || !may_choose(v) {
+                continue;
+            }
+            let Some(triangle) = places.locate(v as u32, filling) else { break };
+            let corners = filling.corners(triangle);
+            let distance = vertical_distance(&corners.map(|site| filling.positions[site as usize]), positions[v]);
+            if distance > self.of_triangles[triangle].distance {
+                self.of_triangles[triangle] = FarVertex { distance, vertex: v as u32 };
+            }
+        }
+        self.has_changed.fill(false);
+        self.last_every = every;
+    }
+
+    /// Returns the `count` vertices that are furthest, one of a triangle, in ascending order.
+    fn of_all(&self, count: usize) -> Vec<FarVertex> {
+        let mut furthest: Vec<FarVertex> = self.of_triangles.iter().copied().filter(|far| far.distance > 0.0).collect();
+        if count < furthest.len() {
+            // Distances are not negative, so their bits are in the same order.
+            furthest.select_nth_unstable_by_key(count, |far| std::cmp::Reverse((far.distance.to_bits(), far.vertex)));
+            furthest.truncate(count);
+        }
+        // Vertices that follow each other are near each other, and so are their places in memory.
+        furthest.sort_unstable_by_key(|far| far.vertex);
+        furthest
+    }
+
+    /// Notes that a triangle has changed. Those beyond the known ones are new anyway.
+    fn note_change(&mut self, triangle: usize) {
+        if let Some(has_changed) = self.has_changed.get_mut(triangle) {
+            *has_changed = true;
         }
     }
-    furthest.retain(|far| far.distance > 0.0);
-    if count < furthest.len() {
-        // Distances are not negative, so their bits are in the same order.
-        furthest.select_nth_unstable_by_key(count, |far| std::cmp::Reverse((far.distance.to_bits(), far.vertex)));
-        furthest.truncate(count);
-    }
-    // Vertices that follow each other are near each other, and so are their places in memory.
-    furthest.sort_unstable_by_key(|far| far.vertex);
-    furthest
 }
 
 /// A triangle for every place, from which it is not far to the one that holds the place.

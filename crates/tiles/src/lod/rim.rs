@@ -26,9 +26,9 @@ impl ShownMesh {
 }
 
 /// Returns the triangles of `filling` that `covers` tells of, with a border that is raised by what the `outline` of the terrain at `positions` is
-/// above them. Skirts reach below the outline by the mean error in steps of z. `may_move` tells which vertices of the terrain are no parts of lines.
+/// above them. Skirts reach below the outline by the mean error in steps of z. `areas` are the weights of [`improve`]. `may_move` tells which vertices of the terrain are no parts of lines.
 pub(crate) fn shown(
-    positions: &[[i32; 3]],
+    (positions, areas): (&[[i32; 3]], &[f64]),
     outline: &Outline,
     filling: &Filling,
     covers: &[bool],
@@ -50,7 +50,7 @@ pub(crate) fn shown(
     }
     let moves = beside(filling, &is_on_border, |site| may_move(filling.vertices[site as usize]));
     for _ in 0..ROUNDS {
-        improve(positions, &moves, filling, places, &mut fitted)?;
+        improve(positions, &moves, filling, places, areas, &mut fitted)?;
     }
     for (site, (&height, &before)) in fitted.iter().zip(&before).enumerate() {
         if let Some(position) = mesh.positions.get_mut(number[site] as usize) {

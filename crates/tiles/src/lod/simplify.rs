@@ -18,7 +18,7 @@ use crate::frame::Frame;
 use crate::lod::covering::covering;
 pub use crate::lod::filling::CoarseMesh;
 use crate::lod::filling::Filling;
-use crate::lod::fit::fit;
+use crate::lod::fit::{areas, fit};
 use crate::lod::kept_lines::KeptLines;
 use crate::lod::outline::Outline;
 use crate::lod::refine::{Places, refine};
@@ -96,13 +96,14 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     let side = side_of(bounds, filling.vertices.len());
     let mut fixed = vec![false; positions.len()];
     kept_lines.vertices.iter().for_each(|&v| fixed[v] = true);
-    let typical_error = fit(positions, |v| fixed[v as usize], &mut filling, &mut places)?;
+    let areas = areas(terrain);
+    let typical_error = fit(positions, |v| fixed[v as usize], &mut filling, &mut places, &areas)?;
     interrupt::check()?;
     let (shown, covers) = match places.locate_all(&filling) {
         places if places.len() == positions.len() => {
             let covers = covering(positions, &outline, &filling, places);
             let may_move = |v: u32| !fixed[v as usize];
-            (Some(shown(positions, &outline, &filling, &covers, places, may_move, typical_error)?), covers)
+            (Some(shown((positions, &areas), &outline, &filling, &covers, places, may_move, typical_error)?), covers)
         }
         // Nearly all triangles are slivers.
         _ => (None, Vec::new()),
