@@ -389,6 +389,20 @@ mod tests {
         let lost = error("[input]\nfiles = 3\n[output]\ndirctory = \"out\"\n");
         assert_eq!(lost.lines().filter(|line| line.starts_with("line ")).count(), 2, "{lost}");
         assert!(!lost.contains("has no key directory:"), "{lost}");
+        // What is missing anyway is told, and nothing that the user did not write.
+        let missing = error("[input]\nsurfce = \"ground\"\n[output]\ndirectory = \"o\"\n");
+        assert!(missing.contains("surface") && missing.contains("files"), "{missing}");
+        assert!(!missing.contains("one key and one value"), "{missing}");
+        // Letters of several bytes, and entries that are read in another order than they are written in.
+        let accents = format!(
+            "[input.csv]\ncolumxs = [\"x\"]\n[output]\ndirectory = \"out\"\n# {}\n[input]\ncrss = \"a\"\n",
+            "é".repeat(50)
+        );
+        assert_eq!(error(&accents).lines().filter(|line| line.starts_with("line ")).count(), 3, "{}", error(&accents));
+        let many: String = (0..50).map(|k| format!("foo{k} = 1\n")).collect();
+        let many = error(&LEAST.replace("[output]", &format!("[output]\n{many}")));
+        assert!(many.ends_with("there are more mistakes"), "{many}");
+        assert_eq!(many.lines().filter(|line| line.starts_with("line ")).count(), 20, "{many}");
     }
 
     #[test]

@@ -10,6 +10,9 @@ use sys::{Error, Result};
 /// A step of a terrain's lattice has at most this many steps of the common one.
 const MOST_PARTS: i64 = 1 << 30;
 
+/// The same where a lattice is made finer than the terrains need: then every vertex is within [`REACH`].
+const MOST_PARTS_FOR_PLACES: i64 = 1 << 8;
+
 /// What to do about lattices whose common step is too small.
 pub(crate) const TOO_FINE: &str = "run one of the jobs again with [input] resolution set to the step of the other";
 
@@ -71,6 +74,26 @@ impl CommonLattice {
         };
         let lattice = CommonLattice { offset: first.offset, steps: [plane, up], ways };
         ways.iter().all(fits).then_some(lattice)
+    }
+
+    /// Returns this lattice with smaller steps in x and y, for places that are not those of vertices: down to a thousandth of a unit, as far as
+    /// whole numbers allow.
+    pub(crate) fn for_places(mut self) -> CommonLattice {
+        let has_room = |way: &LatticeWay| {
+            let [factor, _, _] = way.factor;
+            factor < MOST_PARTS_FOR_PLACES && way.shift[..2].iter().all(|shift| shift.abs() < REACH / 4)
+        };
+        while self.steps[0] > Decimal::new(1, 3) && self.ways.iter().all(has_room) {
+            let Some(half) = self.steps[0].checked_div(Decimal::TWO) else { break };
+            self.steps[0] = half;
+            for way in &mut self.ways {
+                for axis in [0, 1] {
+                    way.factor[axis] = way.factor[axis].saturating_mul(2);
+                    way.shift[axis] = way.shift[axis].saturating_mul(2);
+                }
+            }
+        }
+        self
     }
 
     /// Returns the steps in x and y, and in z, in source units.
@@ -145,6 +168,17 @@ fn greatest_divisor(mut a: i128, mut b: i128) -> i128 {
 mod tests {
     use super::*;
     use std::str::FromStr;
+
+    #[test]
+    fn places_between_the_vertices_are_found() {
+        let metres = lattice(["500000", "4000000", "0"], "1", "0.01");
+        let common = CommonLattice::new([&metres, &metres]).unwrap().for_places();
+        assert_eq!(common.ways[0].point([3, 4, 5]), [768, 1024, 5]);
+        assert_eq!(common.nearest_point([500000.2, 4000000.75]), Some([51, 192]));
+        let fine = lattice(["0", "0", "0"], "0.001", "0.001");
+        let common = CommonLattice::new([&fine, &fine]).unwrap();
+        assert_eq!(common.clone().for_places(), common, "it is fine enough");
+    }
 
     fn lattice(offset: [&str; 3], step: &str, step_z: &str) -> Lattice {
         let number = |text: &str| Decimal::from_str(text).unwrap();

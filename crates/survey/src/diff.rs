@@ -56,6 +56,7 @@ pub fn run(request: &DiffRequest) -> Result<Difference> {
     let names = [&request.before, &request.after].map(|path| path.display().to_string());
     same_system([before.system(), after.system()], names.each_ref().map(String::as_str), &mut warnings)?;
     let lattice = CommonLattice::new([before.lattice(), after.lattice()])?;
+    let lattice = if request.areas.is_some() { lattice.for_places() } else { lattice };
     let read = |path: &Path| read_areas(path, before.system(), &lattice, memory, &mut warnings);
     let areas = request.areas.as_deref().map(read).transpose()?;
     let lanes = Lanes::new([&before, &after], memory)?;

@@ -7,11 +7,12 @@ use rust_decimal::prelude::ToPrimitive;
 /// A rectangle: the least and the greatest x and y.
 type Sides = [[f64; 2]; 2];
 
-/// Returns how much of the clip, of the bounds, or of what both have in common, triangles of this area cover; `None` without either. The area
-/// is doubled, in square lattice steps.
+/// Returns how much of the clip, of the bounds, or of what both have in common, triangles of this area cover; `None` without either, or if
+/// polygons may overlap. The area is doubled, in square lattice steps.
 pub(crate) fn covered_share(plan: &Plan, double_area: f64) -> Option<f64> {
     let bounds = plan.options.input.bounds.map(|bounds| in_steps(bounds.0, &plan.lattice));
     let wanted = match (&plan.clip, bounds) {
+        (Some(clip), _) if may_overlap(&clip.polygons) => return None,
         (Some(clip), bounds) => double_area_of(&clip.polygons, bounds),
         (None, Some([min, max])) => 2.0 * (max[0] - min[0]) * (max[1] - min[1]),
         (None, None) => return None,
@@ -25,6 +26,24 @@ fn in_steps([west, south, east, north]: [f64; 4], lattice: &Lattice) -> Sides {
     let step = number(lattice.resolution);
     let place = |corner: [f64; 2]| [0, 1].map(|axis| (corner[axis] - number(lattice.offset[axis])) / step);
     [place([west, south]), place([east, north])]
+}
+
+/// Tells whether the boxes around two of the polygons have an area in common.
+fn may_overlap(polygons: &Polygons) -> bool {
+    let box_of = |rings: &Vec<Vec<[i64; 2]>>| {
+        let outline = rings.first()?;
+        let ends = |axis: usize| {
+            let values = outline.iter().map(|vertex| vertex[axis]);
+            Some([values.clone().min()?, values.max()?])
+        };
+        Some([ends(0)?, ends(1)?])
+    };
+    let mut boxes: Vec<[[i64; 2]; 2]> = polygons.iter().filter_map(box_of).collect();
+    boxes.sort_unstable();
+    boxes.iter().enumerate().any(|(number, [[_, east], [south, north]])| {
+        let mut later = boxes.iter().skip(number + 1).take_while(|other| other[0][0] < *east);
+        later.any(|other| other[1][0] < *north && *south < other[1][1])
+    })
 }
 
 /// Returns twice the area of polygons, as far as it is within the sides. The first ring of a polygon is its outline, the others are holes.
@@ -86,6 +105,8 @@ mod tests {
         assert_eq!(double_area_of(&polygons, None), 2.0 * (100.0 - 4.0 + 100.0));
         assert_eq!(double_area_of(&polygons, Some([[3.0, 0.0], [25.0, 100.0]])), 2.0 * (70.0 - 2.0 + 50.0));
         assert_eq!(double_area_of(&polygons, Some([[50.0, 0.0], [60.0, 9.0]])), 0.0);
+        assert!(!may_overlap(&polygons));
+        assert!(may_overlap(&vec![vec![square(0, 10)], vec![square(20, 30)], vec![square(9, 12)]]));
         // A comb, whose teeth reach over a side.
         let comb = vec![vec![vec![[0, 0], [5, 0], [5, 9], [4, 9], [4, 2], [1, 2], [1, 9], [0, 9]]]];
         assert_eq!(double_area_of(&comb, Some([[0.0, 4.0], [9.0, 9.0]])), 2.0 * 10.0);
