@@ -10,6 +10,8 @@ mod ground;
 mod lowest;
 mod metric_lattice;
 mod morphology;
+mod plane;
+mod regions;
 mod sizes;
 mod slope;
 #[cfg(test)]

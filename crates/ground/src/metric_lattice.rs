@@ -55,6 +55,12 @@ impl SquareCells {
     pub(crate) fn within(self, place: [i32; 2]) -> [i32; 2] {
         [0, 1].map(|axis| (place[axis] + self.rest[axis]).rem_euclid(self.steps))
     }
+
+    /// Returns where in its cell a place is, in 256ths of the width, rounded down.
+    pub(crate) fn spot(self, place: [i32; 2]) -> [u8; 2] {
+        let part = |along: i32| i64::from(along) * 256 / i64::from(self.steps);
+        self.within(place).map(|along| u8::try_from(part(along)).unwrap_or(u8::MAX))
+    }
 }
 
 #[cfg(test)]

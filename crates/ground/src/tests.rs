@@ -134,7 +134,7 @@ fn the_ground_depends_on_the_points_alone() {
         let columns = Ground::find(&all, GroundSizes::default(), || Ok::<_, ()>(())).unwrap().to_columns();
         assert_eq!((&columns.numbers, &columns.places), (&expected.numbers, &expected.places));
         let bits = |heights: &[f32]| heights.iter().map(|height| height.to_bits()).collect::<Vec<u32>>();
-        assert!(bits(&columns.heights) == bits(&expected.heights));
+        assert!(bits(&columns.cells) == bits(&expected.cells));
     }
 }
 
@@ -161,7 +161,7 @@ fn the_ground_can_be_stored() {
     let again = Ground::of_columns(ground.to_columns()).unwrap();
     assert!(points.iter().all(|(point, _)| ground.has(*point) == again.has(*point)));
     let mut columns = ground.to_columns();
-    columns.heights.pop();
+    columns.cells.pop();
     assert!(Ground::of_columns(columns).is_none());
 }
 
