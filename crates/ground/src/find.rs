@@ -158,7 +158,7 @@ pub(crate) struct Terrain<'a> {
     pub(crate) surface: &'a Cells<f32>,
     pub(crate) covered: &'a Cells<bool>,
     /// The radius of the last opening that cut a cell off.
-    cut: &'a Cells<f32>,
+    pub(crate) cut: &'a Cells<f32>,
     pub(crate) width: f32,
 }
 

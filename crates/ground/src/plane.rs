@@ -10,7 +10,7 @@ const QUARTER: f32 = 1.5;
 /// The weight of the surface in the middle. It decides where there is no ground around.
 const PRIOR: f32 = 0.02;
 /// The weight of a level plane, in squares of the width. It decides where the ground around is a line.
-const LEVEL: f32 = 0.004;
+const LEVEL: f32 = 0.05;
 /// A point may lie farther from a plane by so many times the spread of the ground around it ...
 const BY_SPREAD: f32 = 1.5;
 /// ... and by so many times what the plane falls by in a cell.
@@ -140,4 +140,85 @@ pub(crate) fn with_surroundings<U: Copy + Send + Sync>(
         let surroundings = Surroundings { ground, spots, surface, width };
         (0..SIDE * SIDE).map(|number| of(&surroundings, number % SIDE, number / SIDE)).collect()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cells::{Place, cell_of};
+    use proptest::prelude::*;
+
+    const WIDTH: f32 = 2.0;
+
+    /// Returns where the lowest points of a block are, and their heights on a plane through the middle of cell (0, 0), where `is_ground`.
+    fn sloping(slope: [f32; 2], seed: u64, is_ground: impl Fn(Place) -> bool + Sync) -> (Cells<f32>, Cells<[u8; 2]>) {
+        let spot = |number: usize| {
+            let bits = (number as u64 + seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
+            [(bits & 255) as u8, (bits >> 8 & 255) as u8]
+        };
+        let height = |number: usize| {
+            let cell = cell_of([0, 0], number);
+            let [x, y] = from_middle(spot(number), WIDTH);
+            let [x, y] = [x + cell[0] as f32 * WIDTH, y + cell[1] as f32 * WIDTH];
+            if is_ground(cell) { 40.0 + slope[0] * x + slope[1] * y } else { EMPTY }
+        };
+        let block = || 0..(SIDE * SIDE) as usize;
+        (
+            Cells::of(EMPTY, vec![[0, 0]], |_| block().map(height).collect()),
+            Cells::of([0; 2], vec![[0, 0]], |_| block().map(spot).collect()),
+        )
+    }
+
+    fn planes_of(ground: &Cells<f32>, spots: &Cells<[u8; 2]>, with_own: bool) -> Cells<Plane> {
+        let none = Plane { height: EMPTY, slope: [0.0; 2], spread: 0.0 };
+        let surface = ground.each(EMPTY, |height| if height == EMPTY { 7.0 } else { height });
+        with_surroundings(ground, spots, &surface, (WIDTH, none), |around, column, row| {
+            around.plane(column, row, with_own)
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        /// However steep it is, and wherever in their cells points lie.
+        #[test]
+        fn the_plane_of_a_slope_is_the_slope(slope in [-1.0f32..1.0, -1.0..1.0], seed in 0u64..1000) {
+            let (ground, spots) = sloping(slope, seed, |_| true);
+            let planes = planes_of(&ground, &spots, true);
+            for cell in [[0, 0], [5, 9], [63, 30], [31, 63]] {
+                let plane = planes.at(cell);
+                let height = 40.0 + WIDTH * (slope[0] * cell[0] as f32 + slope[1] * cell[1] as f32);
+                prop_assert!((plane.height - height).abs() < 0.2 && plane.spread < 0.2, "{plane:?}, {height}");
+                let off = [0, 1].map(|axis| (plane.slope[axis] - slope[axis]).abs());
+                prop_assert!(off.iter().all(|off| *off < 0.1), "{off:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_spike_does_not_lift_the_plane_without_it() {
+        let (mut ground, spots) = sloping([0.5, -0.25], 3, |_| true);
+        let number = (20 * SIDE + 20) as usize;
+        ground.block_mut([0, 0])[number] += 3.0;
+        let at = from_middle(spots.at([20, 20]), WIDTH);
+        let above = |with_own| ground.at([20, 20]) - planes_of(&ground, &spots, with_own).at([20, 20]).at(at);
+        assert!((above(false) - 3.0).abs() < 0.1 && above(true) < 2.5, "{}, {}", above(false), above(true));
+    }
+
+    #[test]
+    fn few_cells_of_ground_have_a_plane_too() {
+        for ground in [[].as_slice(), &[[20, 20]], &[[20, 20], [21, 20], [22, 20]]] {
+            let (cells, spots) = sloping([0.5, 0.0], 9, |cell| ground.contains(&cell));
+            for plane in planes_of(&cells, &spots, true).values().flatten() {
+                assert!(plane.height.is_finite() && plane.slope.iter().all(|slope| slope.abs() < 10.0), "{plane:?}");
+            }
+            let far = Plane { height: 7.0, slope: [0.0; 2], spread: 0.0 };
+            assert_eq!(planes_of(&cells, &spots, true).at([50, 50]), far);
+        }
+    }
+
+    #[test]
+    fn points_may_lie_farther_from_rough_and_steep_ground() {
+        let plane = Plane { height: 0.0, slope: [0.6, 0.8], spread: 0.2 };
+        assert!((plane.allowed(0.3, 2.0) - 1.4).abs() < 1e-6);
+    }
 }

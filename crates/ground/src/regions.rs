@@ -115,3 +115,48 @@ fn borders(before: &Cells<bool>, back: &Cells<bool>, terrain: &Terrain) -> Cells
         })
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cells::cell_of;
+    use crate::morphology::EMPTY;
+
+    /// Returns how many of the cells higher than a metre remain of a surface of 64 by 64 metres, and how many they were.
+    fn left_of(height: impl Fn(f32, f32) -> f32 + Sync) -> [usize; 2] {
+        let block = || (0..(SIDE * SIDE) as usize).map(|number| cell_of([0, 0], number));
+        let surface = Cells::of(EMPTY, vec![[0, 0]], |_| block().map(|[x, y]| height(x as f32, y as f32)).collect());
+        let covered = surface.each(false, |_| true);
+        let (before, cut) = (surface.each(false, |height| height < 1.0), surface.each(0.0, |_| 8.0));
+        let terrain = Terrain { surface: &surface, covered: &covered, cut: &cut, width: 1.0 };
+        let kept = ground_regions(&before, &covered, &terrain, &|| Ok::<_, ()>(())).unwrap();
+        assert!(block().all(|cell| kept.at(cell) || !before.at(cell)), "ground is lost");
+        let high = |cells: &Cells<bool>| block().filter(|cell| cells.at(*cell) && !before.at(*cell)).count();
+        [high(&kept), high(&covered)]
+    }
+
+    #[test]
+    fn embankments_stay() {
+        let [left, all] = left_of(|x, _| (6.0 - 0.4 * (x - 32.0).abs()).clamp(0.0, 4.0));
+        assert_eq!(left, all);
+    }
+
+    #[test]
+    fn roofs_and_bridges_go() {
+        let roof = |x: f32, y: f32| if (20.0..40.0).contains(&x) && (20.0..40.0).contains(&y) { 5.0 } else { 0.0 };
+        // It begins at the level of the ground and rises.
+        let bridge = |x: f32, y: f32| if (30.0..36.0).contains(&y) { 0.3 * (x - 3.0).clamp(0.0, 20.0) } else { 0.0 };
+        assert_eq!((left_of(roof)[0], left_of(bridge)[0]), (0, 0));
+        assert!(left_of(roof)[1] == 400 && left_of(bridge)[1] > 300);
+    }
+
+    /// One that meets the ground uphill goes, and a hill beside it stays.
+    #[test]
+    fn each_region_counts_alone() {
+        let [left, all] = left_of(|x, y| match (x, y) {
+            (5.0..15.0, 20.0..40.0) => 5.0,
+            _ => (6.0 - 0.4 * (x - 42.0).abs()).clamp(0.0, 4.0),
+        });
+        assert_eq!(left + 200, all);
+    }
+}
