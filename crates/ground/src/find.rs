@@ -73,6 +73,27 @@ pub(crate) fn find_ground<E>(
     check: &dyn Fn() -> Result<(), E>,
 ) -> Result<GroundCells, E> {
     let lowest = &without_pits(heights, width);
+    let kept = kept_cells(lowest, width, sizes, check)?;
+    let (width, tolerance) = (width as f32, sizes.tolerance.0 as f32);
+    let mut ground = joined(lowest, only_where(lowest, &kept), width, tolerance);
+    for _ in 0..REFINEMENTS {
+        check()?;
+        ground = refined(lowest, spots, &ground, width, tolerance);
+    }
+    check()?;
+    Ok(GroundCells { surface: filled(&ground), lowest: ground })
+}
+
+/// Returns the cells that openings do not cut off, and those that come back since the ground goes on through them.
+///
+/// # Errors
+/// Those of `check`.
+fn kept_cells<E>(
+    lowest: &Cells<f32>,
+    width: f64,
+    sizes: GroundSizes,
+    check: &dyn Fn() -> Result<(), E>,
+) -> Result<Cells<bool>, E> {
     let within = |radius: f64| erosion(lowest, radius).each(false, |least| least != EMPTY);
     let (covered, reached) = (within(NEIGHBOURS), within(EXTENSION / width));
     let surface = filled(lowest);
@@ -86,15 +107,7 @@ pub(crate) fn find_ground<E>(
             kept = grown(&kept, &terrain, growth);
         }
     }
-    kept = ground_regions(&uncut, &kept, &terrain, check)?;
-    let tolerance = sizes.tolerance.0 as f32;
-    let mut ground = joined(lowest, only_where(lowest, &kept), width as f32, tolerance);
-    for _ in 0..REFINEMENTS {
-        check()?;
-        ground = refined(lowest, spots, &ground, width as f32, tolerance);
-    }
-    check()?;
-    Ok(GroundCells { surface: filled(&ground), lowest: ground })
+    ground_regions(&uncut, &kept, &terrain, check)
 }
 
 /// Returns `heights` in the cells that are `wanted`.

@@ -74,9 +74,10 @@ impl Ground {
     pub fn find<E>(lowest: &LowestHeights, sizes: GroundSizes, check: impl Fn() -> Result<(), E>) -> Result<Ground, E> {
         let (heights, base) = lowest.metres();
         let (spots, width) = (lowest.spots(), lowest.width());
-        let found = find_ground(LowestCells { heights: &heights, spots: &spots, width }, sizes, &check)?;
+        let cells = LowestCells { heights: &heights, spots: &spots, width };
+        let GroundCells { surface, lowest: ground } = find_ground(cells, sizes, &check)?;
         check()?;
-        let GroundCells { surface, lowest: ground } = found;
+        drop(heights);
         let width = width as f32;
         let planes = with_surroundings(&ground, &spots, &surface, (width, NOTHING.plane), |around, column, row| {
             around.plane(column, row, true)
