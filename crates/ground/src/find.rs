@@ -17,6 +17,7 @@ use crate::plane::{from_middle, with_surroundings};
 use crate::regions::ground_regions;
 use crate::sizes::GroundSizes;
 use crate::slope::slopes;
+use crate::terrain::{NEIGHBOUR, Terrain};
 
 /// The radius of three by three cells, in cells.
 const NEIGHBOURS: f64 = 1.5;
@@ -166,15 +167,6 @@ fn radii(greatest: f64) -> Vec<f64> {
     radii
 }
 
-/// The ground so far, as far as growing needs it.
-pub(crate) struct Terrain<'a> {
-    pub(crate) surface: &'a Cells<f32>,
-    pub(crate) covered: &'a Cells<bool>,
-    /// The radius of the last opening that cut a cell off.
-    pub(crate) cut: &'a Cells<f32>,
-    pub(crate) width: f32,
-}
-
 /// How cells that openings have cut off come back.
 #[derive(Clone, Copy, Debug)]
 struct Growth {
@@ -190,9 +182,6 @@ struct Growth {
     /// Whether there must be points at the opposite neighbour.
     is_covered: bool,
 }
-
-/// The neighbours of a cell.
-pub(crate) const NEIGHBOUR: [[i32; 2]; 8] = [[1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]];
 
 /// Returns the cells that are `kept`, and those beside them where the ground goes on smoothly from one side to the other.
 fn grown(kept: &Cells<bool>, terrain: &Terrain, growth: Growth) -> Cells<bool> {

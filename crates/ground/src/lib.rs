@@ -14,6 +14,7 @@ mod plane;
 mod regions;
 mod sizes;
 mod slope;
+mod terrain;
 #[cfg(test)]
 mod tests;
 

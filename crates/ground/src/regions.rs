@@ -2,7 +2,7 @@
 //! falls off to it on most sides, even if it meets the ground on one.
 
 use crate::cells::{Cells, Place, SIDE, split};
-use crate::find::{NEIGHBOUR, Terrain};
+use crate::terrain::{NEIGHBOUR, Terrain};
 
 /// Neighbours are one region if the surface between them is no steeper than this.
 const STEEPEST: f32 = 1.5;
