@@ -2,17 +2,22 @@
 //!
 //! It begins as the morphological filter of Pingel, Clarke and McBride 2013, "An improved simple morphological filter for the terrain
 //! classification of airborne LIDAR data": openings by larger and larger discs cut off what is narrower than they are and steeper than the ground.
-//! What they cut off where the ground goes on smoothly comes back, cell by cell, and so does what lies near the surface of the others.
+//! What they cut off where the ground goes on smoothly comes back, cell by cell, but not regions that fall off on most sides. So does what lies near
+//! the surface of the others. At last each cell is compared with the plane of the ground around it.
 //!
-//! Each pass looks at no more than what the one before has left, within a bounded distance. So the result depends on the lowest points alone.
+//! Each pass looks at no more than what the one before has left, within a bounded distance or along a region that came back. So the result depends on
+//! the lowest points alone.
 //! It is computed in single precision, by additions, multiplications, divisions, square roots and comparisons in a fixed order, which have the same
 //! bits on every machine.
 
 use crate::cells::Cells;
 use crate::fill::filled;
 use crate::morphology::{EMPTY, dilation, erosion};
+use crate::plane::{from_middle, with_surroundings};
+use crate::regions::ground_regions;
 use crate::sizes::GroundSizes;
 use crate::slope::slopes;
+use crate::terrain::{NEIGHBOUR, Terrain};
 
 /// The radius of three by three cells, in cells.
 const NEIGHBOURS: f64 = 1.5;
@@ -37,6 +42,8 @@ const JOIN_BY_SLOPE: f32 = 0.85;
 /// Where the surface falls by more than so many metres in a cell, what it falls by beyond adds to the tolerance so many times.
 const CLIFF: f32 = 3.0;
 const BY_CLIFF: f32 = 3.0;
+/// So many times each cell is compared with the plane of the ground around it.
+const REFINEMENTS: usize = 2;
 
 /// What is known of all cells.
 pub(crate) struct GroundCells {
@@ -46,32 +53,62 @@ pub(crate) struct GroundCells {
     pub(crate) lowest: Cells<f32>,
 }
 
-/// Returns the ground of a cloud whose cells have these lowest points in metres, and this width. Calls `check` between passes.
+/// The lowest points of the cells.
+#[derive(Clone, Copy)]
+pub(crate) struct LowestCells<'a> {
+    /// Their heights in metres.
+    pub(crate) heights: &'a Cells<f32>,
+    /// Where in its cell each is: 256ths of the width.
+    pub(crate) spots: &'a Cells<[u8; 2]>,
+    /// The width of a cell in metres.
+    pub(crate) width: f64,
+}
+
+/// Returns the ground of a cloud whose cells have these lowest points. Calls `check` between passes.
 ///
 /// # Errors
 /// Those of `check`.
 pub(crate) fn find_ground<E>(
+    LowestCells { heights, spots, width }: LowestCells,
+    sizes: GroundSizes,
+    check: &dyn Fn() -> Result<(), E>,
+) -> Result<GroundCells, E> {
+    let lowest = &without_pits(heights, width);
+    let kept = kept_cells(lowest, width, sizes, check)?;
+    let (width, tolerance) = (width as f32, sizes.tolerance.0 as f32);
+    let mut ground = joined(lowest, only_where(lowest, &kept), width, tolerance);
+    for _ in 0..REFINEMENTS {
+        check()?;
+        ground = refined(lowest, spots, &ground, width, tolerance);
+    }
+    check()?;
+    Ok(GroundCells { surface: filled(&ground), lowest: ground })
+}
+
+/// Returns the cells that openings do not cut off, and those that come back since the ground goes on through them.
+///
+/// # Errors
+/// Those of `check`.
+fn kept_cells<E>(
     lowest: &Cells<f32>,
     width: f64,
     sizes: GroundSizes,
     check: &dyn Fn() -> Result<(), E>,
-) -> Result<GroundCells, E> {
-    let lowest = &without_pits(lowest, width);
+) -> Result<Cells<bool>, E> {
     let within = |radius: f64| erosion(lowest, radius).each(false, |least| least != EMPTY);
     let (covered, reached) = (within(NEIGHBOURS), within(EXTENSION / width));
     let surface = filled(lowest);
     let cut = cut_off(&only_where(&surface, &reached), &covered, &reached, (width, sizes), check)?;
-    let mut kept = covered.with(&cut, false, |is_covered, radius| is_covered && radius == 0.0);
+    let uncut = covered.with(&cut, false, |is_covered, radius| is_covered && radius == 0.0);
     let terrain = Terrain { surface: &surface, covered: &covered, cut: &cut, width: width as f32 };
+    let mut kept = uncut.clone();
     for growth in [ALONG, AROUND] {
         for _ in 0..growth.rounds {
             check()?;
             kept = grown(&kept, &terrain, growth);
         }
     }
-    let ground = joined(lowest, only_where(lowest, &kept), width as f32, sizes.tolerance.0 as f32);
-    check()?;
-    Ok(GroundCells { surface: filled(&ground), lowest: ground })
+    ground_regions(&uncut, &kept, &terrain, check)
 }
 
 /// Returns `heights` in the cells that are `wanted`.
@@ -130,15 +167,6 @@ fn radii(greatest: f64) -> Vec<f64> {
     radii
 }
 
-/// The ground so far, as far as growing needs it.
-struct Terrain<'a> {
-    surface: &'a Cells<f32>,
-    covered: &'a Cells<bool>,
-    /// The radius of the last opening that cut a cell off.
-    cut: &'a Cells<f32>,
-    width: f32,
-}
-
 /// How cells that openings have cut off come back.
 #[derive(Clone, Copy, Debug)]
 struct Growth {
@@ -154,9 +182,6 @@ struct Growth {
     /// Whether there must be points at the opposite neighbour.
     is_covered: bool,
 }
-
-/// The neighbours of a cell.
-const NEIGHBOUR: [[i32; 2]; 8] = [[1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]];
 
 /// Returns the cells that are `kept`, and those beside them where the ground goes on smoothly from one side to the other.
 fn grown(kept: &Cells<bool>, terrain: &Terrain, growth: Growth) -> Cells<bool> {
@@ -206,8 +231,20 @@ fn joined(lowest: &Cells<f32>, mut ground: Cells<f32>, width: f32, tolerance: f3
     ground
 }
 
+/// Returns the cells whose lowest points lie near the plane of the ground around them, and of the `ground` also those that lie below it.
+fn refined(lowest: &Cells<f32>, spots: &Cells<[u8; 2]>, ground: &Cells<f32>, width: f32, tolerance: f32) -> Cells<f32> {
+    let expected = with_surroundings(ground, spots, &filled(ground), (width, [EMPTY; 2]), |around, column, row| {
+        let plane = around.plane(column, row, false);
+        [plane.at(from_middle(around.spot(column, row), width)), plane.allowed(tolerance, width)]
+    });
+    let above = lowest.with(&expected, [EMPTY; 2], |height, [expected, allowed]| [height - expected, allowed]);
+    let is_near = above
+        .with(ground, false, |[above, allowed], ground| above <= allowed && (above >= -allowed || ground != EMPTY));
+    only_where(lowest, &is_near)
+}
+
 /// Returns how far a point may lie from the surface where it falls by so many metres in a cell.
-pub(crate) fn allowed_distance(tolerance: f32, by_slope: f32, fall: f32) -> f32 {
+fn allowed_distance(tolerance: f32, by_slope: f32, fall: f32) -> f32 {
     tolerance + by_slope * fall + BY_CLIFF * (fall - CLIFF).max(0.0)
 }
 

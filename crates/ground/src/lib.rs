@@ -10,8 +10,11 @@ mod ground;
 mod lowest;
 mod metric_lattice;
 mod morphology;
+mod plane;
+mod regions;
 mod sizes;
 mod slope;
+mod terrain;
 #[cfg(test)]
 mod tests;
 

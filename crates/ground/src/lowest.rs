@@ -9,15 +9,23 @@ use crate::morphology::EMPTY;
 const LEAST_WIDTH: f64 = 1.0;
 /// A cell is this many times as wide as points are apart, or wider.
 const SPACINGS: f64 = 0.75;
-/// The height of a cell without a point.
-const NONE: i32 = i32::MAX;
+/// The lowest point of a cell. Of points at one height, the one with the least place is lower.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct LowestPoint {
+    z: i32,
+    /// Where in the cell it is: 256ths of its width, along x and along y.
+    spot: [u8; 2],
+}
+
+/// What a cell without a point has.
+const NONE: LowestPoint = LowestPoint { z: i32::MAX, spot: [0; 2] };
 
 /// The lowest points of a cloud, cell by cell.
 #[derive(Clone, Debug)]
 pub struct LowestHeights {
     pub(crate) lattice: MetricLattice,
     pub(crate) squares: SquareCells,
-    cells: Cells<i32>,
+    cells: Cells<LowestPoint>,
 }
 
 impl LowestHeights {
@@ -39,9 +47,15 @@ impl LowestHeights {
 
     /// Returns the heights in metres above the lowest of all, and that one.
     pub(crate) fn metres(&self) -> (Cells<f32>, i32) {
-        let base = self.cells.values().flatten().copied().min().unwrap_or(0);
-        let metres = |z: &i32| if *z == NONE { EMPTY } else { metres_above(base, *z, self.lattice) };
+        let base = self.cells.values().flatten().map(|lowest| lowest.z).min().unwrap_or(0);
+        let metres =
+            |lowest: &LowestPoint| if *lowest == NONE { EMPTY } else { metres_above(base, lowest.z, self.lattice) };
         (self.cells.map(EMPTY, 0, |window| window.values.iter().map(metres).collect()), base)
+    }
+
+    /// Returns where in their cells they are: 256ths of the width, along x and along y.
+    pub(crate) fn spots(&self) -> Cells<[u8; 2]> {
+        self.cells.map([0; 2], 0, |window| window.values.iter().map(|lowest| lowest.spot).collect())
     }
 }
 
@@ -59,7 +73,9 @@ impl PointCollector for LowestHeights {
         for [x, y, z] in points {
             let (block, number) = split(self.squares.of([x, y]));
             let lowest = &mut self.cells.block_mut(block)[number];
-            *lowest = z.min(*lowest);
+            if z <= lowest.z {
+                *lowest = LowestPoint { z, spot: self.squares.spot([x, y]) }.min(*lowest);
+            }
         }
     }
 

@@ -55,6 +55,12 @@ impl SquareCells {
     pub(crate) fn within(self, place: [i32; 2]) -> [i32; 2] {
         [0, 1].map(|axis| (place[axis] + self.rest[axis]).rem_euclid(self.steps))
     }
+
+    /// Returns where in its cell a place is, in 256ths of the width, rounded down.
+    pub(crate) fn spot(self, place: [i32; 2]) -> [u8; 2] {
+        let part = |along: i32| i64::from(along) * 256 / i64::from(self.steps);
+        self.within(place).map(|along| u8::try_from(part(along)).unwrap_or(u8::MAX))
+    }
 }
 
 #[cfg(test)]
@@ -68,12 +74,14 @@ mod tests {
                 let on = |offset: [i64; 2]| {
                     let cells = MetricLattice { horizontal: 0.01, vertical: 0.01, offset }.cells(steps);
                     let place = offset.map(|offset| i32::try_from(world - offset).unwrap());
-                    (cells.of(place), cells.within(place))
+                    (cells.of(place), cells.within(place), cells.spot(place))
                 };
                 let expected = [world.div_euclid(i64::from(steps)), world.rem_euclid(i64::from(steps))];
                 let expected = expected.map(|along| along as i32);
                 for offset in [[0, 0], [123_456_789, -100], [-99_999, 100_000_001]] {
-                    assert_eq!(on(offset), ([expected[0]; 2], [expected[1]; 2]), "{steps}, {world}, {offset:?}");
+                    let (cell, within, spot) = on(offset);
+                    assert_eq!((cell, within), ([expected[0]; 2], [expected[1]; 2]), "{steps}, {world}, {offset:?}");
+                    assert_eq!(spot.map(i32::from), within.map(|within| within * 256 / steps));
                 }
             }
         }

@@ -100,8 +100,8 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
         blocks.save_as(&folder.store, StepRecord::Selected)?;
         if number == 0 {
             ColumnWriter::default().push(&on_ground).write(&folder.store, StepRecord::OnGround)?;
-            if let Some(GroundColumns { numbers, places, heights }) = source.ground().map(Ground::to_columns) {
-                let columns = ColumnWriter::default().push(&numbers).push(&places).push(&heights);
+            if let Some(GroundColumns { numbers, places, cells }) = source.ground().map(Ground::to_columns) {
+                let columns = ColumnWriter::default().push(&numbers).push(&places).push(&cells);
                 columns.write(&folder.store, StepRecord::Ground)?;
             }
         }
@@ -151,8 +151,8 @@ pub(crate) fn found_ground(job: &Job) -> sys::Result<Ground> {
     let store = open_store(&directory, records_of(&entries).into_values())?;
     let mut columns = ColumnReader::open(&store, StepRecord::Ground)?;
     let ground =
-        GroundColumns { numbers: columns.column_vec()?, places: columns.column_vec()?, heights: columns.column_vec()? };
-    Ground::of_columns(ground).ok_or_else(|| sys::Error::Broken("the ground has no heights".into()))
+        GroundColumns { numbers: columns.column_vec()?, places: columns.column_vec()?, cells: columns.column_vec()? };
+    Ground::of_columns(ground).ok_or_else(|| sys::Error::Broken("the ground has no cells".into()))
 }
 
 /// Returns a hash of the rule by which triangles along the hull may be slivers.
