@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     /// Areas of the points of a [`Square`] that are all equal.
-    const EQUAL: [f64; 2_500] = [1.0; 2_500];
+    static EQUAL: [f64; 2_500] = [1.0; 2_500];
 
     /// A lattice of 50 by 50 points, of which the outermost and every seventh are kept.
     struct Square {
