@@ -239,15 +239,19 @@ fn files_that_are_no_area_and_areas_without_points_are_refused() {
 #[test]
 fn a_report_says_how_much_of_the_area_is_covered_and_the_next_job_what_it_replaces() {
     let folder = tempfile::tempdir().unwrap();
-    let cloud = folder.path().join("grid.csv");
+    let grid = folder.path().join("grid.csv");
     let rows = (0..11).flat_map(|x| (0..11).map(move |y| format!("{},{},{}\n", x * 10, y * 10, (x * y) % 5)));
-    fs::write(&cloud, format!("x,y,z\n{}", rows.collect::<String>())).unwrap();
-    let job = Job::on(&[&cloud]).with("input", "bounds = [0, 0, 250, 100]").with("output", "hull = \"whole\"");
-    let shown = job.run().succeeded();
+    fs::write(&grid, format!("x,y,z\n{}", rows.collect::<String>())).unwrap();
+    let on_grid = Job::on(&[&grid]).with("input", "bounds = [0, 0, 250, 100]").with("output", "hull = \"whole\"");
+    let shown = on_grid.run().succeeded();
     assert!(shown.out.contains("covers    40 % of the bounds") && !shown.err.contains("replaces"), "{shown:?}");
-    let again = job.with("output", "normals = false").run().succeeded();
+    let again = on_grid.with("output", "normals = false").run().succeeded();
     assert!(again.err.contains("has a terrain with other options (200 triangles): this job replaces it"), "{again:?}");
     let (_cloud, clipped) = clipped();
-    let share = clipped.report()["covered_share"].as_f64().unwrap();
+    assert!(clipped.report()["covered_share"].is_null(), "its areas overlap");
+    let apart = vec![two_areas().swap_remove(0), vec![vec![[14_000, 500], [15_500, 600], [15_000, 1_500]]]];
+    let cloud = cloud(folder.path(), &places(2_000, &apart));
+    let share =
+        job(&cloud, &geojson(folder.path(), "apart.geojson", &apart)).report()["covered_share"].as_f64().unwrap();
     assert!(share > 0.5 && share < 1.0, "{share}");
 }

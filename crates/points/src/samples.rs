@@ -1,14 +1,16 @@
 //! A quick look at the content of a file: its size, and a hash of its beginning, its end and samples between them.
 
 use std::fs::File;
+use std::io::ErrorKind;
 use std::path::Path;
+use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64, xxh3_128};
 
 use crate::ept::files::page;
 use crate::ept::key::NodeKey;
-use crate::ept::name::is_ept;
+use crate::ept::name::{NODES, PAGES, is_ept};
 use crate::remote::identity;
 use crate::remote::name::is_remote;
 use sys::positional_io::read_exact_at;
@@ -42,12 +44,14 @@ impl FileSamples {
         FileSamples::of_one(path)
     }
 
-    /// As [`FileSamples::of`], of an EPT: its index, and the first page of its hierarchy, which has the number of points of many nodes.
+    /// As [`FileSamples::of`], of an EPT: its index, the first page of its hierarchy, which has the number of points of many nodes, and on this
+    /// machine the names, sizes and times of all its files.
     fn of_ept(path: &Path) -> Result<FileSamples> {
         let index = FileSamples::of_one(path)?;
         let page = page(path, NodeKey::default())?;
         let page = page.as_ref();
-        let parts = [index.samples, xxh3_64(page)].map(u64::to_le_bytes).concat();
+        let files = if is_remote(path) { 0 } else { xxh3_64(files_beside(path)?.as_bytes()) };
+        let parts = [index.samples, xxh3_64(page), files].map(u64::to_le_bytes).concat();
         Ok(FileSamples { bytes: index.bytes + page.len() as u64, samples: xxh3_64(&parts) })
     }
 
@@ -60,6 +64,30 @@ impl FileSamples {
         let samples = hash_of_samples(&file, bytes).map_err(Error::io("read", path))?;
         Ok(FileSamples { bytes, samples })
     }
+}
+
+/// Returns a line for each file of the nodes and pages beside the index of an EPT: its name, its size, and when it was written, in whole seconds
+/// since 1970.
+fn files_beside(index: &Path) -> Result<String> {
+    let mut lines = Vec::new();
+    for folder in [NODES, PAGES].map(|name| index.with_file_name(name)) {
+        let read = || {
+            for entry in folder.read_dir()? {
+                let entry = entry?;
+                let data = entry.metadata()?;
+                let age = data.modified()?.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |age| age.as_secs());
+                lines.push(format!("{} {} {age}\n", entry.file_name().to_string_lossy(), data.len()));
+            }
+            Ok(())
+        };
+        match read() {
+            // Whoever reads its files names those that are not there.
+            Err(e) if e.kind() == ErrorKind::NotFound => {}
+            read => read.map_err(Error::io("read", &folder))?,
+        }
+    }
+    lines.sort_unstable();
+    Ok(lines.concat())
 }
 
 /// Returns a text of 32 hexadecimal digits that tells these files from others, whatever their names and their order.
@@ -80,4 +108,30 @@ fn hash_of_samples(file: &File, bytes: u64) -> std::io::Result<u64> {
         hasher.update(&buffer);
     }
     Ok(hasher.digest())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use std::time::Duration;
+
+    #[test]
+    fn a_node_that_is_written_again_makes_another_data_set() {
+        let folder = tempfile::tempdir().unwrap();
+        let index = folder.path().join("ept.json");
+        fs::write(&index, "{}").unwrap();
+        for (name, file) in [(PAGES, "0-0-0-0.json"), (NODES, "0-0-0-0.bin"), (NODES, "1-0-0-0.bin")] {
+            fs::create_dir_all(folder.path().join(name)).unwrap();
+            fs::write(folder.path().join(name).join(file), "{}").unwrap();
+        }
+        let before = FileSamples::of(&index).unwrap();
+        assert_eq!(FileSamples::of(&index).unwrap(), before);
+        let node = fs::OpenOptions::new().write(true).open(folder.path().join(NODES).join("1-0-0-0.bin")).unwrap();
+        node.set_modified(SystemTime::now() + Duration::from_secs(10)).unwrap();
+        let after = FileSamples::of(&index).unwrap();
+        assert_ne!(after, before);
+        fs::remove_file(folder.path().join(NODES).join("1-0-0-0.bin")).unwrap();
+        assert_ne!(FileSamples::of(&index).unwrap(), after);
+    }
 }

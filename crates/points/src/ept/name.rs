@@ -8,6 +8,10 @@ use crate::remote::places::last_name;
 /// The name of its index.
 pub(crate) const EPT: &str = "ept.json";
 
+/// The folders of its pages and its nodes.
+pub(crate) const PAGES: &str = "ept-hierarchy";
+pub(crate) const NODES: &str = "ept-data";
+
 /// Tells whether a path or a public name is that of the index of an EPT.
 pub fn is_ept(path: &Path) -> bool {
     last_name(&path.to_string_lossy()).eq_ignore_ascii_case(EPT)
@@ -15,10 +19,10 @@ pub fn is_ept(path: &Path) -> bool {
 
 /// Returns the name of a page of the hierarchy, from the folder of the index.
 pub(crate) fn page_name(root: NodeKey) -> String {
-    format!("ept-hierarchy/{root}.json")
+    format!("{PAGES}/{root}.json")
 }
 
 /// Returns the name of a node with this ending, likewise.
 pub(crate) fn node_name(node: NodeKey, ending: &str) -> String {
-    format!("ept-data/{node}.{ending}")
+    format!("{NODES}/{node}.{ending}")
 }
