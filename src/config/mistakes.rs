@@ -30,9 +30,11 @@ pub(crate) fn all_explained(text: &str, first: Error) -> String {
     messages.join("\n")
 }
 
-/// Returns what is wrong with a text, and the line.
+/// Returns what is wrong with a text, and the line. What is on no line comes last.
 fn message(text: &str, error: &Error) -> (usize, String) {
-    (line_at(text, error.span().map_or(0, |span| span.start)), explained(text, error))
+    let what = explained(text, error);
+    let line = error.span().filter(|_| what.starts_with("line ")).map(|span| line_at(text, span.start));
+    (line.unwrap_or(usize::MAX), what)
 }
 
 /// Returns the number of the line with byte `at`, from 0.

@@ -387,6 +387,6 @@ fn a_job_that_fits_on_fewer_threads_gets_them_and_one_that_fits_nowhere_says_so(
         assert!(text.contains("\nthreads = ") && said.out.contains("set       threads = "), "{text}");
         assert!(need() < most);
     }
-    let said = run(90, &["init", "cloud.csv", "--force"]);
+    let said = run(100, &["init", "cloud.csv", "--force"]);
     said.refused(1, &["not enough memory"]);
 }

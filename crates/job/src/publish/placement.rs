@@ -137,8 +137,8 @@ pub(crate) fn placement_warning(placement: &Result<Placement, NotPlaced>) -> Opt
     }
 }
 
-/// Returns what the user should know about the unit of heights, if the terrain has a CRS and nothing states that unit. Beside metres heights
-/// are in metres, but beside feet either is common.
+/// Returns what the user should know about the unit of heights, if the terrain has a CRS and nothing states that unit. Beside feet either is
+/// common. Beside metres heights are in metres, so [`heights_warning`] is enough.
 pub(crate) fn height_unit_warning(crs: &Crs) -> Option<String> {
     let is_unknown = crs.vertical.is_none() && !crs.has_ellipsoidal_heights() && crs.horizontal != Unit::Metre;
     (crs.name.is_some() && is_unknown).then(|| {
@@ -152,16 +152,21 @@ pub(crate) fn height_unit_warning(crs: &Crs) -> Option<String> {
 
 /// Returns what the user should know about the heights of a terrain on the globe, to which `offset` is added.
 pub(crate) fn heights_warning(crs: &Crs, offset: Option<&HeightOffset>) -> Option<String> {
+    let has_assumed_metres = crs.vertical.is_none() && crs.vertical_system.is_none() && crs.horizontal == Unit::Metre;
     let from = match &crs.vertical_system {
         _ if crs.has_ellipsoidal_heights() => {
             return offset.filter(|offset| offset.is_model()).map(|_| ADDED_TWICE.into());
         }
         _ if offset.is_some() => return None,
         Some(system) => format!("heights are above {}", system.label()),
+        None if has_assumed_metres => {
+            "vertical datum and unit unknown: heights are taken to be in the unit of x and y (metre), and may be above sea level".into()
+        }
         None => "vertical datum unknown: heights may be above sea level".to_string(),
     };
+    let unit = if has_assumed_metres { "; and [input] height_unit, if their unit is another one" } else { "" };
     Some(format!(
         "{from}, not the ellipsoid, so the terrain may be tens of metres too low or high on the globe; fix: [output] height_offset = \
-         \"egm96\" or a geoid grid; 0.0 if they are above the ellipsoid"
+         \"egm96\" or a geoid grid; 0.0 if they are above the ellipsoid{unit}"
     ))
 }
