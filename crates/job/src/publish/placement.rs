@@ -2,11 +2,10 @@
 
 use crate::plan::globe_system::globe_system;
 use crate::tiles::curve::{ONE_TRANSFORM, ONE_TRANSFORM_SIDEWAYS};
-use crs::Crs;
 use crs::geoid::Geoid;
 use crs::geoid::option::HeightOffset;
-use crs::unit::Unit;
 use crs::vertical::VerticalSystem;
+use crs::{Crs, Unit};
 use rayon::prelude::*;
 use serde::Serialize;
 use tiles::curvature::Curvature;
