@@ -71,7 +71,7 @@ impl FileSamples {
 fn files_beside(index: &Path) -> Result<String> {
     let mut lines = Vec::new();
     for folder in [NODES, PAGES].map(|name| index.with_file_name(name)) {
-        let read = || {
+        let mut read = || -> std::io::Result<()> {
             for entry in folder.read_dir()? {
                 let entry = entry?;
                 let data = entry.metadata()?;
