@@ -1,6 +1,6 @@
 //! Heights along lines: where they cross the edges of the mesh, and at their own vertices.
 //!
-//! The lines are taken in runs of neighbouring segments ([`search`]): a run reads the tiles that it may meet, and its rows are written before
+//! The lines are taken in runs of neighbouring segments (`search.rs`): a run reads the tiles that it may meet, and its rows are written before
 //! the next. A run that would find more than memory allows is divided. So what is in memory grows with the file of lines, not with
 //! what the lines cross.
 
