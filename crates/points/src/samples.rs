@@ -75,13 +75,13 @@ fn files_beside(index: &Path) -> Result<String> {
             for entry in folder.read_dir()? {
                 let entry = entry?;
                 let data = entry.metadata()?;
-                let age = data.modified()?.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |age| age.as_secs());
-                lines.push(format!("{} {} {age}\n", entry.file_name().to_string_lossy(), data.len()));
+                let written = data.modified()?.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.as_secs());
+                lines.push(format!("{} {} {written}\n", entry.file_name().to_string_lossy(), data.len()));
             }
             Ok(())
         };
         match read() {
-            // Whoever reads its files names those that are not there.
+            // Reading the data set names the files that are missing.
             Err(e) if e.kind() == ErrorKind::NotFound => {}
             read => read.map_err(Error::io("read", &folder))?,
         }

@@ -10,7 +10,7 @@ use sys::{Result, interrupt};
 /// How often all heights move. Each further time would change them by a few hundredths of the error.
 const ROUNDS: usize = 3;
 
-/// Returns the area of the triangles around each vertex of a terrain, six times that of its share of the ground.
+/// Returns twice the area of the triangles around each vertex of a terrain, in square lattice steps: six times its share of the ground.
 pub(crate) fn areas(terrain: &Terrain) -> Vec<f64> {
     let mut areas = vec![0.0; terrain.positions.len()];
     for corners in terrain.triangles {
@@ -54,8 +54,8 @@ fn rounded(positions: &[[i32; 3]], heights: &[f64]) -> impl Iterator<Item = i32>
     heights.iter().map(move |height| (height.round() as i32).clamp(low, high))
 }
 
-/// Moves those `heights` of `filling` once that may move. `located` has the triangle around each of `positions`, and `areas` its weight. Returns the mean of
-/// the distances before, in the triangles with a height that may move.
+/// Moves those `heights` of `filling` once that may move. `located` has the triangle around each of `positions`, and `areas` its weight.
+/// Returns the mean of the distances before, in the triangles with a height that may move.
 ///
 /// # Errors
 /// [`sys::Error::Interrupted`].

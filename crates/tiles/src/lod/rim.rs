@@ -26,7 +26,8 @@ impl ShownMesh {
 }
 
 /// Returns the triangles of `filling` that `covers` tells of, with a border that is raised by what the `outline` of the terrain at `positions` is
-/// above them. Skirts reach below the outline by the mean error in steps of z. `areas` are the weights of [`improve`]. `may_move` tells which vertices of the terrain are no parts of lines.
+/// above them. Skirts reach below the outline by the mean error in steps of z. `areas` are the weights of [`improve`]. `may_move` tells which
+/// vertices of the terrain are no parts of lines.
 pub(crate) fn shown(
     (positions, areas): (&[[i32; 3]], &[f64]),
     outline: &Outline,
