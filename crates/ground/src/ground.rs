@@ -9,8 +9,8 @@ use crate::morphology::EMPTY;
 use crate::plane::{Plane, with_surroundings};
 use crate::sizes::GroundSizes;
 
-/// The bytes of memory for each cell while the ground is found, about.
-pub const BYTES_PER_CELL: u64 = 56;
+/// The bytes of memory for each cell while the ground is found and stored, about.
+pub const BYTES_PER_CELL: u64 = 64;
 
 /// The ground in a cell.
 #[derive(Clone, Copy, Debug)]
