@@ -135,6 +135,19 @@ fn the_points_within_several_areas_are_kept_whatever_the_tiles() {
     }
 }
 
+/// Corners are rounded to a lattice that is finer than that of points: on a grid of metres, a border between rows stays there.
+#[test]
+fn corners_between_the_points_of_a_grid_keep_what_lies_within() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid: Vec<[i64; 2]> = (0..20).flat_map(|x| (0..20).map(move |y| [100 * x, 100 * y])).collect();
+    let square = vec![vec![vec![[50, 50], [1_049, 50], [1_049, 1_050], [50, 1_050]]]; 2];
+    let (cloud, clip) = (cloud(folder.path(), &grid), geojson(folder.path(), "area.geojson", &square));
+    let job = Job::on(&[&cloud])
+        .with("input", &format!("crs = \"EPSG:32633\"\nresolution = 1.0\nclip = {:?}", clip.to_str().unwrap()));
+    assert_eq!(number(&job.report()["sites"]), 100);
+    proved(&job, &[&cloud]);
+}
+
 #[test]
 fn holes_are_empty_and_another_polygon_starts_the_job_over() {
     let folder = tempfile::tempdir().unwrap();

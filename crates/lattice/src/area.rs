@@ -1,6 +1,7 @@
 //! An area on the lattice: which lattice points lie within the polygons of `[input] clip`.
 //!
-//! The rule, in whole numbers:
+//! The vertices of polygons lie on a finer lattice ([`Lattice::for_places`](crate::Lattice::for_places)), so that a polygon between the points of a coarse grid keeps
+//! the points within it. The rule, in whole numbers:
 //! - A point lies in the area if it lies in any of the polygons.
 //! - A point lies in a polygon if a ray from it crosses the rings of the polygon an odd number of times (even-odd). So holes are outside.
 //! - A point on an edge lies in the polygon, whether the edge is of the outline or of a hole.
@@ -12,7 +13,7 @@
 //! The way must meet no vertex. So it lies beside the corner by less than any distance between coordinates: by ε to the right and by δ
 //! upwards, where δ is much less than ε. Wherever a comparison of whole numbers ends in a tie, ε and δ decide it.
 
-/// The polygons of an area: of each its rings, in lattice steps. The last vertex of a ring is joined with the first.
+/// The polygons of an area: of each its rings, in parts of a lattice step. The last vertex of a ring is joined with the first.
 pub type Polygons = Vec<Vec<Vec<[i64; 2]>>>;
 
 /// Vertices lie within this distance of zero along x and y. Cross products of their differences then fit an `i128` with room to spare.
@@ -30,6 +31,9 @@ const MOST_CELLS: u64 = 1 << 22;
 /// Edges are listed about so often each, at most; and [`FEWEST_CELLS`] times more in all.
 const LISTED_PER_EDGE: u64 = 16;
 
+/// A cell with a side of two to this power holds all points, in parts of a step.
+const ALL_IN_ONE_CELL: u32 = 44;
+
 /// Points that fit an `i32` are asked for. No cell lies outside.
 const POINTS: [i64; 2] = [i32::MIN as i64, i32::MAX as i64];
 
@@ -37,7 +41,9 @@ const POINTS: [i64; 2] = [i32::MIN as i64, i32::MAX as i64];
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LatticeArea {
     edges: Vec<Edge>,
-    /// The least x and y, and the greatest, of all points that may be inside. Inside out if there is none.
+    /// The number of parts in a lattice step. All coordinates here are in parts.
+    parts: i64,
+    /// The least x and y, and the greatest, of all places that may be inside. Inside out if there is none.
     min: [i64; 2],
     max: [i64; 2],
     /// The side of a cell is two to this power.
@@ -74,7 +80,7 @@ struct Edge {
     polygon: u32,
 }
 
-/// A way from the corner of a cell, in lattice steps, to a point, in units of 1 / `SCALE` lattice steps.
+/// A way from the corner of a cell, in parts, to a place, in units of 1 / `SCALE` parts.
 #[derive(Clone, Copy)]
 struct Way {
     corner: [i64; 2],
@@ -82,26 +88,28 @@ struct Way {
 }
 
 impl LatticeArea {
-    /// Returns the area of these polygons. Rings without three vertices count as far as they have edges.
-    pub fn new(polygons: &[Vec<Vec<[i64; 2]>>]) -> LatticeArea {
+    /// Returns the area of these polygons, whose coordinates are in units of 1 / `parts` lattice steps. Of rings without three vertices, the
+    /// points on their edges are in the area.
+    pub fn new(polygons: &[Vec<Vec<[i64; 2]>>], parts: i64) -> LatticeArea {
         let edges = edges_of(polygons);
         let all = |axis: usize| edges.iter().flat_map(move |edge| [edge.a[axis], edge.b[axis]]);
-        let min = [0, 1].map(|axis| all(axis).min().unwrap_or(i64::MAX).max(POINTS[0]));
-        let max = [0, 1].map(|axis| all(axis).max().unwrap_or(i64::MIN).min(POINTS[1]));
-        let empty = LatticeArea { edges, min, max, shift: 0, columns: 0, cells: Vec::new(), lists: Vec::new() };
+        let min = [0, 1].map(|axis| all(axis).min().unwrap_or(i64::MAX).max(parts * POINTS[0]));
+        let max = [0, 1].map(|axis| all(axis).max().unwrap_or(i64::MIN).min(parts * POINTS[1]));
+        let empty = LatticeArea { edges, parts, min, max, shift: 0, columns: 0, cells: Vec::new(), lists: Vec::new() };
         if (0..2).any(|axis| min[axis] > max[axis]) { empty } else { empty.with_cells() }
     }
 
     /// Tells whether a lattice point lies in the area.
     #[inline]
     pub fn holds(&self, point: [i32; 2]) -> bool {
-        self.holds_scaled::<1>(point.map(i64::from))
+        self.holds_scaled::<1>(point.map(|value| self.parts * i64::from(value)))
     }
 
     /// Tells whether the centroid of a triangle lies in the area: a third of the sum of its corners.
     #[inline]
     pub fn holds_centroid(&self, corners: [[i32; 2]; 3]) -> bool {
-        self.holds_scaled::<3>([0, 1].map(|axis| corners.iter().map(|corner| i64::from(corner[axis])).sum()))
+        let sum = |axis: usize| corners.iter().map(|corner| i64::from(corner[axis])).sum::<i64>();
+        self.holds_scaled::<3>([0, 1].map(|axis| self.parts * sum(axis)))
     }
 
     /// Tells whether some of a triangle lies in the area: the centroid of one of the 16 equal triangles that it consists of.
@@ -113,19 +121,24 @@ impl LatticeArea {
         // Those that point as the whole triangle does, and the others. The weights of a centroid add up to 12.
         weights(1, 3).chain(weights(2, 2)).any(|weights| {
             let weighted = |axis: usize| {
-                corners.iter().zip(weights).map(|(corner, weight)| weight * i64::from(corner[axis])).sum()
+                corners.iter().zip(weights).map(|(corner, weight)| weight * i64::from(corner[axis])).sum::<i64>()
             };
-            self.holds_scaled::<12>([weighted(0), weighted(1)])
+            self.holds_scaled::<12>([0, 1].map(|axis| self.parts * weighted(axis)))
         })
     }
 
-    /// Returns the least and the greatest x and y of all points that may be inside; `None` if there is none.
+    /// Returns the least and the greatest x and y of lattice points around all that may be inside; `None` if there is none.
     pub fn bounds(&self) -> Option<[[i32; 2]; 2]> {
-        let corner = |corner: [i64; 2]| Some([i32::try_from(corner[0]).ok()?, i32::try_from(corner[1]).ok()?]);
-        if self.cells.is_empty() { None } else { Some([corner(self.min)?, corner(self.max)?]) }
+        if self.cells.is_empty() {
+            return None;
+        }
+        let point = |place: [i64; 2]| Some([i32::try_from(place[0]).ok()?, i32::try_from(place[1]).ok()?]);
+        let below = self.min.map(|value| value.div_euclid(self.parts));
+        let above = self.max.map(|value| -(-value).div_euclid(self.parts));
+        Some([point(below)?, point(above)?])
     }
 
-    /// Tells whether a point lies in the area, whose coordinates are in units of 1 / `SCALE` lattice steps.
+    /// Tells whether a place lies in the area, whose coordinates are in units of 1 / `SCALE` parts.
     #[inline]
     fn holds_scaled<const SCALE: i64>(&self, point: [i64; 2]) -> bool {
         let is_beyond = |axis: usize| point[axis] < SCALE * self.min[axis] || point[axis] > SCALE * self.max[axis];
@@ -173,7 +186,7 @@ impl LatticeArea {
         let is_fit = |shift: &u32| {
             count(0, *shift).saturating_mul(count(1, *shift)) <= most && self.listed(*shift, most_listed) <= most_listed
         };
-        self.shift = (0..u32::BITS).find(is_fit).unwrap_or(u32::BITS);
+        self.shift = (0..ALL_IN_ONE_CELL).find(is_fit).unwrap_or(ALL_IN_ONE_CELL);
         let [columns, rows] = [count(0, self.shift) as usize, count(1, self.shift) as usize];
         self.columns = columns;
         let mut edges_of_rows = vec![Vec::new(); rows];
@@ -417,20 +430,25 @@ mod tests {
         fn the_rule_is_that_of_all_edges(
             polygons in prop::collection::vec(prop_oneof![polygon(60, 80), polygon(9, 20), tangle()], 0..5),
             points in prop::collection::vec(prop::array::uniform2(-150i32..150), 40),
+            parts in prop_oneof![2 => Just(1), 1 => 2i64..7],
         ) {
-            let area = LatticeArea::new(&polygons);
+            let area = LatticeArea::new(&polygons, parts);
             let vertices = polygons.iter().flatten().flatten().map(|vertex| vertex.map(|value| value as i32));
-            let points: Vec<[i32; 2]> = points.into_iter().chain(vertices).collect();
+            let points = points.into_iter().chain(vertices).map(|point| point.map(|value| value / parts as i32));
+            let points: Vec<[i32; 2]> = points.collect();
             for point in &points {
-                prop_assert_eq!(area.holds(*point), is_inside(&polygons, point.map(i64::from), 1), "{:?}", point);
+                let place = point.map(|value| parts * i64::from(value));
+                prop_assert_eq!(area.holds(*point), is_inside(&polygons, place, 1), "{:?}", point);
+                let is_around = |[min, max]: [[i32; 2]; 2]| (0..2).all(|axis| min[axis] <= point[axis] && point[axis] <= max[axis]);
+                prop_assert!(!area.holds(*point) || area.bounds().is_some_and(is_around));
             }
             for corners in points.windows(3) {
-                let sum = [0, 1].map(|axis| corners.iter().map(|corner| i64::from(corner[axis])).sum());
+                let sum = [0, 1].map(|axis| parts * corners.iter().map(|corner| i64::from(corner[axis])).sum::<i64>());
                 let corners = [corners[0], corners[1], corners[2]];
-                let parts = (0..12).flat_map(|i| (0..12).map(move |j| [i, j, 12 - i - j]));
+                let triples = (0..12).flat_map(|i| (0..12).map(move |j| [i, j, 12 - i - j]));
                 let is_part = |weights: &[i64; 3]| weights[2] > 0 && weights.iter().all(|weight| weight % 3 == weights[0] % 3 && weight % 3 > 0);
-                let mut centroids = parts.filter(is_part).map(|weights| {
-                    [0, 1].map(|axis| (0..3).map(|corner| weights[corner] * i64::from(corners[corner][axis])).sum())
+                let mut centroids = triples.filter(is_part).map(|weights| {
+                    [0, 1].map(|axis| (0..3).map(|corner| parts * weights[corner] * i64::from(corners[corner][axis])).sum())
                 });
                 let holds_some = centroids.any(|centroid| is_inside(&polygons, centroid, 12));
                 prop_assert_eq!(area.holds_some_of(corners), holds_some, "{:?}", corners);
@@ -444,7 +462,7 @@ mod tests {
             points in prop::collection::vec(prop::array::uniform2(-(1i32 << 29)..1 << 29), 60),
             shares in prop::collection::vec((0usize..1000, 0i64..=8), 30),
         ) {
-            let area = LatticeArea::new(&polygons);
+            let area = LatticeArea::new(&polygons, 1);
             let ring = &polygons[0][0];
             // Points on edges, as far as these have some, and beside them.
             let on_edges = shares.iter().map(|&(edge, share)| {
@@ -471,7 +489,7 @@ mod tests {
             vec![vec![square(0, 128), square(0, 128)]],
             vec![vec![vec![[0, 0], [100, 50]]], vec![vec![[7, 7]]]],
         ] {
-            let area = LatticeArea::new(&polygons);
+            let area = LatticeArea::new(&polygons, 1);
             for y in -3..132 {
                 for x in -3..132 {
                     let expected = is_inside(&polygons, [x.into(), y.into()], 1);
@@ -484,7 +502,7 @@ mod tests {
     #[test]
     fn borders_of_outlines_and_holes_are_inside() {
         let square = |low: i64, high: i64| vec![[low, low], [high, low], [high, high], [low, high]];
-        let area = LatticeArea::new(&[vec![square(0, 100), square(40, 60)]]);
+        let area = LatticeArea::new(&[vec![square(0, 100), square(40, 60)]], 1);
         for (point, expected) in [
             ([0, 0], true),
             ([100, 37], true),
@@ -497,16 +515,38 @@ mod tests {
             assert_eq!(area.holds(point), expected, "{point:?}");
         }
         assert_eq!(area.bounds(), Some([[0, 0], [100, 100]]));
-        let [none, far] = [Vec::new(), vec![vec![square(1 << 40, 1 << 41)]]].map(|all| LatticeArea::new(&all));
+        let [none, far] = [Vec::new(), vec![vec![square(1 << 40, 1 << 41)]]].map(|all| LatticeArea::new(&all, 1));
         assert!(none.bounds().is_none() && !none.holds([0, 0]));
         assert!(far.bounds().is_none() && !far.holds([i32::MAX; 2]));
+    }
+
+    /// On a grid of a metre, a polygon in centimetres keeps what lies within, and not what its rounded corners would.
+    #[test]
+    fn corners_lie_between_lattice_points() {
+        let area = LatticeArea::new(&[vec![vec![[50, 50], [1049, 50], [1049, 1050], [50, 1050]]]], 100);
+        let inside = (-2..14).flat_map(|x| (-2..14).map(move |y| [x, y])).filter(|point| area.holds(*point));
+        assert_eq!(inside.count(), 100);
+        assert_eq!(area.bounds(), Some([[0, 0], [11, 11]]));
+    }
+
+    /// The extremes of a lattice and of its parts.
+    #[test]
+    fn an_area_of_everything_holds_the_farthest_points() {
+        let far = 1000 * POINTS[1];
+        let area =
+            LatticeArea::new(&[vec![vec![[-far - 1000, -far - 1000], [far, -far], [far, far], [-far, far]]]], 1000);
+        for (point, expected) in [([i32::MAX; 2], true), ([i32::MIN; 2], true), ([i32::MIN, 0], false), ([0, 0], true)]
+        {
+            assert_eq!(area.holds(point), expected, "{point:?}");
+        }
+        assert!(area.holds_some_of([[i32::MIN; 2], [i32::MAX, i32::MIN], [0, i32::MAX]]));
     }
 
     /// A country around a village: the grid covers what points can reach.
     #[test]
     fn a_polygon_may_reach_far_beyond_the_lattice() {
         let far = FARTHEST_VERTEX;
-        let area = LatticeArea::new(&[vec![vec![[-far, -far], [far, -far], [far, far]]]]);
+        let area = LatticeArea::new(&[vec![vec![[-far, -far], [far, -far], [far, far]]]], 1);
         for (point, expected) in
             [([0, 0], true), ([0, 1], false), ([i32::MAX, i32::MAX - 1], true), ([i32::MIN; 2], true)]
         {
@@ -518,7 +558,7 @@ mod tests {
     #[test]
     fn cells_along_a_border_list_few_edges() {
         let distances: Vec<i64> = (0..100_000).map(|i| 70 + i * 7919 % 23).collect();
-        let area = LatticeArea::new(&[vec![star([0, 0], 5_000_000, &distances)]]);
+        let area = LatticeArea::new(&[vec![star([0, 0], 5_000_000, &distances)]], 1);
         let listed = area.lists.len() as u64;
         assert!(listed < (LISTED_PER_EDGE + 1) * 100_000, "{listed}");
         assert!(area.cells.iter().filter(|cell| **cell == INSIDE).count() > area.cells.len() / 4);

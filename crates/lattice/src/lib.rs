@@ -16,6 +16,9 @@ use serde::{Deserialize, Serialize};
 /// The raw integer of a coordinate that no other raw integer can hold. It lies outside every lattice.
 pub const BEYOND: i64 = i64::MIN;
 
+/// So many steps of the lattice of places are a step of that of points.
+const PARTS_OF_STEP: i64 = 1000;
+
 /// The lattice of a job, in source units.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lattice {
@@ -46,6 +49,25 @@ impl Lattice {
         let lattice = Lattice { offset, resolution, resolution_z };
         let ends = [0, 1, 2].into_iter().flat_map(|axis| [i32::MIN, i32::MAX].map(|i| (axis, i)));
         ends.into_iter().all(|(axis, i)| lattice.exact_world(axis, i).is_some()).then_some(lattice)
+    }
+
+    /// Returns a finer lattice in x and y, for places that are not those of points, and the number of its steps in one of this: a thousand, or
+    /// one where world coordinates would need more digits than a decimal has.
+    pub fn for_places(&self) -> (Lattice, i64) {
+        let is_exact = |lattice: &Lattice, axis: usize, i: i64| {
+            let back =
+                lattice.exact_world(axis, i)?.checked_sub(lattice.offset[axis])?.checked_div(lattice.resolution)?;
+            Some(back == Decimal::from(i))
+        };
+        let finer = || {
+            let resolution = self.resolution.checked_div(Decimal::from(PARTS_OF_STEP))?;
+            let lattice = Lattice { resolution, ..self.clone() };
+            let ends = [0, 1]
+                .into_iter()
+                .flat_map(|axis| [i32::MIN, i32::MAX].map(|i| (axis, PARTS_OF_STEP * i64::from(i) + 1)));
+            ends.into_iter().all(|(axis, i)| is_exact(&lattice, axis, i).unwrap_or(false)).then_some(lattice)
+        };
+        finer().map_or_else(|| (self.clone(), 1), |lattice| (lattice, PARTS_OF_STEP))
     }
 
     /// Returns the step along `axis` (0: x, 1: y, 2: z).
@@ -265,6 +287,25 @@ mod tests {
 
     fn decimal(text: &str) -> Decimal {
         Decimal::from_str_exact(text).unwrap()
+    }
+
+    #[test]
+    fn places_lie_on_a_lattice_that_is_as_fine_as_decimals_allow() {
+        for (step, finer, parts) in [
+            ("1", "0.001", 1000),
+            ("0.01", "0.00001", 1000),
+            ("0.0003048006096012192", "0.0000003048006096012192", 1000),
+            ("0.91440182880365758", "0.00091440182880365758", 1000),
+            ("0.000000000000000001", "0.000000000000000000001", 1000),
+        ] {
+            let decimal = |text| Decimal::from_str_exact(text).unwrap();
+            let lattice =
+                Lattice::new([decimal("635000.01"), Decimal::ZERO, Decimal::ZERO], decimal(step), Decimal::ONE)
+                    .unwrap();
+            let (places, found) = lattice.for_places();
+            assert_eq!((places.resolution.normalize(), found), (decimal(finer), parts), "{step}");
+            assert_eq!(places.exact_world(0, 5 * parts), lattice.exact_world(0, 5), "{step}");
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use crate::source_transform::OwnCoordinates;
 use crs::choice::CrsChoice;
 use crs::system::{Crs, CrsKind};
 use crs::transform::between::{CrsTransform, DatumNote};
+use crs::unit::Unit;
 use rust_decimal::prelude::ToPrimitive;
 use sys::{Warnings, of_inputs};
 
@@ -58,15 +59,28 @@ pub(crate) fn warn_of_lengths(sources: &[Source], said: &[Crs], options: &InputO
     }
 }
 
-/// Warns about sources in degrees that do not say the unit of their heights.
+/// Warns about sources in degrees or in feet whose heights have no unit. Beside metres, heights are in metres.
 pub(crate) fn warn_of_heights(sources: &[Source], said: &[Crs], warnings: &mut Warnings) {
-    let is_silent = |crs: &Crs| crs.vertical.is_none() && crs.metres_per_unit().is_none();
-    let silent: Vec<&Source> = sources.iter().zip(said).filter(|(_, crs)| is_silent(crs)).map(|pair| pair.0).collect();
-    if let Some(first) = silent.first() {
+    let silent = |is_meant: &dyn Fn(&Crs) -> bool| -> Vec<(&Source, &Crs)> {
+        let is_silent = |crs: &Crs| crs.vertical.is_none() && is_meant(crs);
+        sources.iter().zip(said).filter(|(_, crs)| is_silent(crs)).collect()
+    };
+    let in_feet = silent(&|crs| {
+        crs.metres_per_unit().is_some() && crs.horizontal != Unit::Metre && !crs.has_ellipsoidal_heights()
+    });
+    if let Some((first, crs)) = in_feet.first() {
+        warnings.push(format!(
+            "{}its heights have no unit: the unit of its x and y ({}) is assumed; fix: [input] height_unit = \"metre\", \"foot\" or \"us-foot\"",
+            of_inputs(in_feet.len(), sources.len(), &first.path),
+            crs.horizontal.name()
+        ));
+    }
+    let in_degrees = silent(&|crs| crs.metres_per_unit().is_none());
+    if let Some((first, _)) = in_degrees.first() {
         warnings.push(format!(
             "{}its heights have no unit: metres assumed; fix: a CRS with a vertical part, such as [input] crs = \"EPSG:4269+6360\" for \
              US survey feet, if that is wrong",
-            of_inputs(silent.len(), sources.len(), &first.path)
+            of_inputs(in_degrees.len(), sources.len(), &first.path)
         ));
     }
 }

@@ -1,4 +1,4 @@
-//! The area that a job kept points in, as its report says: the polygons of `[input] clip` on the lattice.
+//! The area that a job kept points in, as its report says: the polygons of `[input] clip` on a lattice finer than that of points.
 //!
 //! A point lies in the area if it lies in a polygon, or on one of its edges: of the outline or of a hole. The job decides that with cells;
 //! here horizontal bands list the edges, and the crate `robust` tells on which side of them a point lies.
@@ -27,6 +27,8 @@ struct Edge {
 
 /// The area of a job.
 pub(super) struct ClipArea {
+    /// The number of parts in a lattice step. All coordinates here are in parts.
+    parts: i64,
     least: i64,
     greatest: i64,
     /// The height of a band.
@@ -35,8 +37,8 @@ pub(super) struct ClipArea {
 }
 
 impl ClipArea {
-    /// Returns the area of these polygons.
-    pub(super) fn new(polygons: &Polygons) -> ClipArea {
+    /// Returns the area of these polygons, whose coordinates are in units of 1 / `parts` lattice steps.
+    pub(super) fn new(polygons: &Polygons, parts: i64) -> ClipArea {
         let mut edges = Vec::new();
         for (polygon, rings) in (0..).zip(polygons) {
             for ring in rings {
@@ -59,12 +61,12 @@ impl ClipArea {
         for edge in &edges {
             band_range(edge, height).for_each(|band| bands[band as usize].push(*edge));
         }
-        ClipArea { least, greatest, height, bands }
+        ClipArea { parts, least, greatest, height, bands }
     }
 
     /// Tells whether a site lies in the area.
     pub(super) fn holds(&self, site: Site) -> bool {
-        let [x, y] = site.map(i64::from);
+        let [x, y] = site.map(|value| self.parts * i64::from(value));
         if y < self.least || y > self.greatest {
             return false;
         }
@@ -113,10 +115,16 @@ mod tests {
             vec![vec![vec![[5, 5]]]],
             Vec::new(),
         ] {
-            let (area, of_job) = (ClipArea::new(&polygons), LatticeArea::new(&polygons));
-            for y in -12..115 {
-                for x in -12..125 {
-                    assert_eq!(area.holds([x, y]), of_job.holds([x, y]), "{x}, {y} in {polygons:?}");
+            for parts in [1, 3] {
+                let (area, of_job) = (ClipArea::new(&polygons, parts), LatticeArea::new(&polygons, parts));
+                for y in -12..115 {
+                    for x in -12..125 {
+                        assert_eq!(
+                            area.holds([x, y]),
+                            of_job.holds([x, y]),
+                            "{x}, {y} of {parts} parts in {polygons:?}"
+                        );
+                    }
                 }
             }
         }

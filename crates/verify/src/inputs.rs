@@ -389,8 +389,9 @@ pub(super) fn lattice_of(facts: &ReportedFacts, extras: &Extras) -> Result<Latti
 /// Returns the area that the job kept points in; `None` for everywhere.
 fn clip_area(facts: &ReportedFacts, lattice: &Lattice) -> Result<Option<ClipArea>> {
     let Some(clip) = &facts.clip else { return Ok(None) };
-    match lattice.polygons_of_text(&clip.area) {
-        Some(polygons) => Ok(Some(ClipArea::new(&polygons))),
+    let (places, parts) = lattice.for_places();
+    match places.polygons_of_text(&clip.area) {
+        Some(polygons) => Ok(Some(ClipArea::new(&polygons, parts))),
         None => {
             Err(Error::Config("report.json: the area of clip is no MULTIPOLYGON on the lattice of the tiles".into()))
         }

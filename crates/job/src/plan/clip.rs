@@ -1,7 +1,7 @@
 //! The area of `[input] clip`: the polygons of a file, brought to the system of the job as breaklines are, and then to its lattice.
 //!
-//! Points come to the lattice, and the polygons do, each vertex rounded once. Whether a point lies inside is decided there, in whole
-//! numbers ([`LatticeArea`]). The box of the polygons does for the plan what `bounds` do: it limits the extent, and the nodes of a COPC
+//! Points come to the lattice, and the polygons to one that is a thousand times as fine, each vertex rounded once. Whether a point lies
+//! inside is decided there, in whole numbers ([`LatticeArea`]). The box of the polygons does for the plan what `bounds` do: it limits the extent, and the nodes of a COPC
 //! file that are read. Unlike `bounds`, it also leaves files aside whose headers lie outside.
 
 use crate::options::JobOptions;
@@ -41,8 +41,10 @@ pub struct PlannedClip {
     /// The file that they are from.
     #[serde(with = "sys::path_text")]
     pub file: PathBuf,
-    /// Their rings in lattice steps.
+    /// Their rings, in parts of a lattice step.
     pub polygons: Polygons,
+    /// The number of parts in a lattice step.
+    pub parts: i64,
     /// Their box in source units, as their file has them: [xmin, ymin, xmax, ymax].
     pub area_box: [f64; 4],
     /// A box in source units outside of which no point can come to a place within the area.
@@ -95,11 +97,12 @@ impl ClipFile {
     /// # Errors
     /// [`Error::Input`] names a feature with a vertex that is no place on it.
     pub(crate) fn on_lattice(&self, lattice: &Lattice) -> Result<PlannedClip> {
+        let (places, parts) = lattice.for_places();
         let mut polygons = Vec::with_capacity(self.0.features.len());
         for feature in &self.0.features {
             interrupt::check()?;
             let LineShape::Area(rings) = &feature.shape else { continue };
-            let vertex = |&[x, y, _]: &[f64; 3]| match (lattice.nearest(0, x), lattice.nearest(1, y)) {
+            let vertex = |&[x, y, _]: &[f64; 3]| match (places.nearest(0, x), places.nearest(1, y)) {
                 (Some(x), Some(y)) => Ok([x, y]),
                 _ => {
                     let what = format!("feature {} has the vertex ({x:?}, {y:?}), which is no place", feature.number);
@@ -109,10 +112,10 @@ impl ClipFile {
             let ring = |ring: &Vec<[f64; 3]>| ring.iter().map(vertex).collect::<Result<Vec<_>>>();
             polygons.push(rings.iter().map(ring).collect::<Result<Vec<_>>>()?);
         }
-        let area = LatticeArea::new(&polygons);
+        let area = LatticeArea::new(&polygons, parts);
         let (file, area_box) = (self.0.path.clone(), self.area_box());
         let reach = reach(&area, lattice).unwrap_or(area_box);
-        Ok(PlannedClip { file, polygons, area_box, reach, area: OnceLock::from(Arc::new(area)) })
+        Ok(PlannedClip { file, polygons, parts, area_box, reach, area: OnceLock::from(Arc::new(area)) })
     }
 
     /// Leaves the files aside whose headers say that no point of theirs lies in the box of the polygons, and whose first records do not
@@ -135,7 +138,7 @@ impl ClipFile {
 impl PlannedClip {
     /// Returns the area.
     pub(crate) fn area(&self) -> Arc<LatticeArea> {
-        self.area.get_or_init(|| Arc::new(LatticeArea::new(&self.polygons))).clone()
+        self.area.get_or_init(|| Arc::new(LatticeArea::new(&self.polygons, self.parts))).clone()
     }
 }
 

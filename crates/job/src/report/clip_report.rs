@@ -15,7 +15,8 @@ pub struct ClipReport {
     pub polygons: u64,
     /// The number of their vertices.
     pub vertices: u64,
-    /// The polygons on the lattice of the job, in its CRS: well-known text (MULTIPOLYGON), whose numbers are exact.
+    /// The polygons in the CRS of the job, on a lattice a thousand times as fine as that of its points: well-known text (MULTIPOLYGON), whose
+    /// numbers are exact.
     pub area: String,
 }
 
@@ -27,7 +28,7 @@ impl ClipReport {
             file: clip.file.clone(),
             polygons: polygons.len() as u64,
             vertices: polygons.iter().flatten().map(|ring| ring.len() as u64).sum(),
-            area: lattice.text_of_polygons(polygons),
+            area: lattice.for_places().0.text_of_polygons(polygons),
         }
     }
 }

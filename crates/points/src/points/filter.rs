@@ -361,7 +361,7 @@ mod tests {
     #[test]
     fn polygons_hold_for_places_on_the_lattice() {
         let rounding = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::from(10)).unwrap();
-        let area = LatticeArea::new(&[vec![vec![[0, 0], [10, 0], [10, 10], [0, 10]]]]);
+        let area = LatticeArea::new(&[vec![vec![[0, 0], [10, 0], [10, 10], [0, 10]]]], 1);
         let rules = PointRules {
             maps: [rounding; 3],
             classes: std::array::from_fn(|class| class != 9),
@@ -401,7 +401,7 @@ mod tests {
         assert_eq!(quick_maps(&PointRules { returns: KeptReturns::First, ..rules.clone() }), None);
         let everywhere = RawBounds { min: [i64::MIN; 2], max: [i64::MAX; 2] };
         assert_eq!(quick_maps(&PointRules { bounds: Some(everywhere), ..rules.clone() }), None);
-        let area = Arc::new(LatticeArea::new(&[vec![vec![[0, 0], [9, 0], [0, 9]]]]));
+        let area = Arc::new(LatticeArea::new(&[vec![vec![[0, 0], [9, 0], [0, 9]]]], 1));
         assert_eq!(quick_maps(&PointRules { clip: Some(area), ..rules.clone() }), None);
         let rounding = AxisMap::new(Decimal::ZERO, Decimal::ONE, Decimal::ZERO, Decimal::from(2)).unwrap();
         for axis in 0..3 {
