@@ -137,14 +137,7 @@ pub fn in_flags(text: &str) -> String {
             rest = match after.strip_prefix(" = ") {
                 Some(value) if !is_longer => {
                     done.push(' ');
-                    // A word needs no quotes there.
-                    match value.strip_prefix('"').and_then(|word| word.split_once('"')) {
-                        Some((word, rest)) if !word.contains(' ') => {
-                            done.push_str(word);
-                            rest
-                        }
-                        _ => value,
-                    }
+                    without_quotes(value, &mut done)
                 }
                 _ => after,
             };
@@ -153,6 +146,23 @@ pub fn in_flags(text: &str) -> String {
         words = done;
     }
     words
+}
+
+/// Adds a word, or several such as `"metre", "foot" or "us-foot"`, to `done` without quotes, which a command line does not need. Returns the rest of
+/// the text.
+fn without_quotes<'a>(text: &'a str, done: &mut String) -> &'a str {
+    let mut rest = text;
+    let mut between = "";
+    while let Some((word, after)) = rest.strip_prefix(between).and_then(|next| next.strip_prefix('"')?.split_once('"'))
+    {
+        if word.contains(' ') {
+            break;
+        }
+        done.extend([between, word]);
+        rest = after;
+        between = [", ", " or "].into_iter().find(|between| rest.starts_with(between)).unwrap_or(between);
+    }
+    rest
 }
 
 /// Refuses flags of point clouds beside a command.
@@ -202,6 +212,9 @@ mod tests {
             ("set [input] unit = \"foot\"", "set --unit foot"),
             ("[input] crs or [input] crs_of_all, [output] hull", "--crs or [input] crs_of_all, --hull"),
             ("[output] raster", "--raster"),
+            ("[input] unit = \"metre\", \"foot\" or \"us-foot\"; \"auto\"", "--unit metre, foot or us-foot; \"auto\""),
+            ("[input] crs = \"a b\" or \"c\"", "--crs \"a b\" or \"c\""),
+            ("[input] unit = \"foot\"\"", "--unit foot\""),
             ("[output.raster] resolution", "[output.raster] resolution"),
         ] {
             assert_eq!(in_flags(said), words);

@@ -67,6 +67,11 @@ pub fn load(path: &Path) -> Result<JobOptions> {
         Err(e) => return Err(Error::Config(format!("cannot read the configuration {}: {e}", path.display()))),
     };
     let refused = |what: String| Error::Config(format!("{}: {what}", path.display()));
+    if bytes.starts_with(b"LASF") {
+        return Err(refused(
+            "this is a point cloud, not a configuration; fix: `gdt-batch cloud.laz --write-config job.toml` writes a configuration for it".into(),
+        ));
+    }
     let text = String::from_utf8(bytes).map_err(|error| refused(not_utf_8(&error)))?;
     let mut options = parse(&text).map_err(refused)?;
     resolve_paths(&mut options, path.parent().unwrap_or(Path::new(""))).map_err(refused)?;

@@ -14,7 +14,12 @@ const LONGEST: usize = 120;
 pub(crate) fn about_value(option: &ConfigOption, value: Option<&Value>, said: &str) -> String {
     let is_jargon = JARGON.iter().any(|start| said.starts_with(start));
     let takes = if is_jargon { format!("{} takes {}", option.key, form(option, said)) } else { said.to_string() };
-    let meant = value.and_then(|value| meant(option, value)).filter(|meant| meant.len() <= LONGEST);
+    // A date without quotes is text that lacks them.
+    let value = match value {
+        Some(Value::Datetime(date)) => Some(Value::String(date.to_string())),
+        value => value.cloned(),
+    };
+    let meant = value.and_then(|value| meant(option, &value)).filter(|meant| meant.len() <= LONGEST);
     // What the user has meant is an example, and what says more than what the option takes has its own advice.
     let has_example = takes.contains("such as") || meant.as_ref().is_some_and(|meant| meant.starts_with(option.key));
     let needs_example = takes.starts_with(option.key) && !has_example;

@@ -159,4 +159,6 @@ fn wrong_levels_are_refused_before_the_job_begins() {
         job.run().refused(2, &words);
         assert!(!job.out().exists());
     }
+    let above = Job::on(&[&cloud]).with("output.contours", "levels = [1e6]");
+    assert!(above.report()["warnings"].to_string().contains("contours.gpkg has no line"));
 }

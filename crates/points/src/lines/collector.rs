@@ -244,7 +244,7 @@ impl<'a> FeatureCollector<'a> {
             }
             RawGeometry::Other(what) => Err(self.refuse(
                 number,
-                format!("is {what}: breaklines are lines or areas; leave it out, or make a line of it"),
+                format!("is {what}, but {}: leave it out, or make a line of it", self.options.purpose.requirement()),
             )),
             RawGeometry::Several(all) => {
                 all.into_iter().try_for_each(|geometry| self.add_geometry(number, kind, height, geometry))

@@ -75,6 +75,15 @@ impl LinePurpose {
         }
     }
 
+    /// Returns what messages say of the geometries that are taken.
+    pub(crate) fn requirement(self) -> &'static str {
+        match self {
+            LinePurpose::Breaklines => "breaklines are lines or areas",
+            LinePurpose::Clip => "the area of a clip is polygons",
+            LinePurpose::Places => "only lines and areas are taken",
+        }
+    }
+
     /// Returns what to do about the file at `path` if it states no CRS that can be used.
     pub fn remedy_of_crs(self, path: &Path) -> String {
         match self {

@@ -30,6 +30,17 @@ pub struct ContourStats {
     pub bytes: u64,
 }
 
+impl ContourStats {
+    /// Returns what the user should know about a file without lines.
+    pub(crate) fn warning(&self) -> Option<String> {
+        (self.lines == 0).then(|| {
+            "contours.gpkg has no line: no level lies between the lowest and the highest point; fix: a smaller [output.contours] interval, or \
+             other levels"
+                .into()
+        })
+    }
+}
+
 /// Contour lines that are to be written.
 pub(crate) struct ContourWork<'a> {
     plan: &'a Plan,

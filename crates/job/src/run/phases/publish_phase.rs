@@ -365,6 +365,7 @@ fn publish(
         (placement, stats) = (placed.ok(), levels);
     }
     warnings.extend(height_unit_warning(&plan.crs));
+    warnings.extend(contours.and_then(|contours| contours.warning()));
     warnings.extend(hull_warning(plan, written.hull));
     warnings.extend(check_photo(plan)?);
     warnings.extend(without_pixel_warning(plan, written.stats.without_pixel));
