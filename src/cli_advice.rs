@@ -2,6 +2,7 @@
 
 use crate::cli::Cli;
 use crate::cloud_job::option_of_flag;
+use crate::config::option_list::options;
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use clap::{Arg, Command, CommandFactory};
@@ -50,7 +51,19 @@ fn place_of(all: &Command, option: &str) -> Option<String> {
     }
     let own = all_commands(all).filter(|command| has(command, option));
     let names: Vec<String> = own.map(name_of).collect();
-    (!names.is_empty()).then(|| format!("{option} is an option of {}", names.join(", ")))
+    match &names[..] {
+        [] => key_of(option).map(|key| {
+            format!("{option} is no option, but a configuration has {key}; gdt-batch cloud.laz --write-config job.toml writes one")
+        }),
+        names => Some(format!("{option} is an option of {}", names.join(", "))),
+    }
+}
+
+/// Returns what messages call the key of a configuration with the name of an option.
+fn key_of(option: &str) -> Option<String> {
+    let key = option.strip_prefix("--")?.replace('-', "_");
+    let found = options().into_iter().find(|known| known.key == key)?;
+    Some(format!("{} {key}", found.table))
 }
 
 fn name_of(command: &Command) -> String {
@@ -77,6 +90,8 @@ mod tests {
             (&["info", "a.laz", "--restart"], "--restart is an option of gdt-batch submit, gdt-batch FILE"),
             (&["check", "job.toml", "--surface", "all"], "a configuration sets [input] surface"),
             (&["a.laz", "--max-eror", "1"], "similar argument exists: '--max-error'"),
+            (&["a.laz", "--max-edge", "30"], "a configuration has [output] max_edge"),
+            (&["a.laz", "--copyright", "me"], "a configuration has [output] copyright"),
         ] {
             let told = told(words);
             assert!(told.contains(advice) && !told.contains("as a value"), "{words:?}: {told}");

@@ -17,7 +17,7 @@ pub(crate) struct Flag {
 }
 
 /// The flags that are lines of a configuration and no paths.
-const FLAGS: [Flag; 15] = [
+const FLAGS: [Flag; 16] = [
     Flag { name: "surface", table: "input", key: "surface", value: |given| text(&given.surface) },
     Flag {
         name: "bounds",
@@ -41,7 +41,8 @@ const FLAGS: [Flag; 15] = [
     Flag { name: "color", table: "output", key: "color", value: |given| text(&given.color) },
     Flag { name: "raster", table: "output", key: "raster", value: |given| given.raster.map(raster) },
     Flag { name: "export", table: "output", key: "export", value: |given| words(&given.export) },
-    Flag { name: "contours", table: "output", key: "contours", value: |given| given.contours.map(contours) },
+    Flag { name: "contours", table: "output", key: "contours", value: contours },
+    Flag { name: "page", table: "output", key: "page", value: |given| given.page.then(|| true.into()) },
     Flag { name: "terrain", table: "output", key: "terrain", value: |given| given.terrain.then(terrain) },
 ];
 
@@ -79,8 +80,11 @@ fn raster(resolution: f64) -> Value {
     toml::Table::from_iter([("resolution".to_string(), Value::Float(resolution))]).into()
 }
 
-fn contours(interval: f64) -> Value {
-    toml::Table::from_iter([("interval".to_string(), Value::Float(interval))]).into()
+/// Who wants DXF of the mesh wants it of the lines too.
+fn contours(given: &CloudOptions) -> Option<Value> {
+    let interval = ("interval".to_string(), Value::Float(given.contours?));
+    let dxf = given.export.iter().any(|format| format == "dxf").then(|| ("dxf".to_string(), true.into()));
+    Some(toml::Table::from_iter([Some(interval), dxf].into_iter().flatten()).into())
 }
 
 fn terrain() -> Value {

@@ -26,12 +26,16 @@ pub struct CloudOptions {
     /// Also write the heights as terrain.tif, with cells of this side, in the unit of x and y.
     #[arg(long, value_name = "SIDE", value_parser = number, allow_negative_numbers = true)]
     pub raster: Option<f64>,
-    /// Also write the mesh for CAD and other programs: landxml, dxf, obj, ply; several with commas.
+    /// Also write the triangles for CAD and other programs: landxml, dxf, obj, ply; several with commas.
     #[arg(long, value_name = "FORMATS", value_delimiter = ',', value_parser = choice("[output]", "export"))]
     pub export: Vec<String>,
-    /// Also write contour lines as contours.gpkg, with this height from one to the next, in the unit of heights.
+    /// Also write contour lines as contours.gpkg, with this height from one to the next, in the unit of heights. With --export dxf, also as
+    /// contours.dxf.
     #[arg(long, value_name = "INTERVAL", value_parser = number, allow_negative_numbers = true)]
     pub contours: Option<f64>,
+    /// Also write index.html, a page that shows the terrain: put the output on a web server.
+    #[arg(long)]
+    pub page: bool,
     /// Also write terrain tiles for globes such as CesiumJS to terrain/. They need --height-offset if heights are above sea level.
     #[arg(long)]
     pub terrain: bool,
@@ -50,7 +54,8 @@ pub struct CloudOptions {
     /// The unit of x and y, if the files name none.
     #[arg(long, value_name = "UNIT", value_parser = choice("[input]", "unit"))]
     pub unit: Option<String>,
-    /// The unit of z, if the files name none. Default: that of x and y.
+    /// The unit of z, if the files name none; foot is the international one. Default: that of x and y. Results keep it, unless --to-crs names
+    /// another.
     #[arg(long, value_name = "UNIT", value_parser = choice("[input]", "height_unit"))]
     pub height_unit: Option<String>,
     /// Colours of the vertices: an orthophoto (GeoTIFF, also by URL), or rgb, elevation, class or none.

@@ -6,7 +6,7 @@ mod least;
 mod mistake;
 mod mistakes;
 pub(crate) mod nearest;
-mod option_list;
+pub(crate) mod option_list;
 mod paths;
 mod place;
 mod short_message;
@@ -56,6 +56,12 @@ const RENAMED: [Renamed; 7] = [
 /// # Errors
 /// [`Error::Config`] with the offending line if the text is not a valid configuration or the file cannot be read.
 pub fn load(path: &Path) -> Result<JobOptions> {
+    if path.is_dir() {
+        let path = path.display();
+        return Err(Error::Config(format!(
+            "{path} is a folder, not a configuration; `gdt-batch verify {path}` checks results"
+        )));
+    }
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {

@@ -84,12 +84,11 @@ fn about_surface(page: &mut Page, findings: &Findings, draft: &Draft, sources: &
     if offers.ground {
         page.offer("surface = \"ground\"", "bare earth: only points on the ground and on water");
     }
-    if offers.bare_earth && !draft.sets("surface") {
-        page.offer("surface = \"bare-earth\"", "bare earth: a ground filter, which ignores the classes");
+    if offers.bare_earth {
+        offer_unset(page, draft, "surface = \"bare-earth\"", "bare earth: a ground filter, which ignores the classes");
     }
-    let has_returns = sources.iter().any(|source| source.by_return.iter().skip(1).any(|count| *count > 0));
-    if has_returns && !draft.sets("surface") {
-        page.offer("surface = \"first\"", "roofs and tree tops: only first returns");
+    if sources.iter().any(|source| source.by_return.iter().skip(1).any(|count| *count > 0)) {
+        offer_unset(page, draft, "surface = \"first\"", "roofs and tree tops: only first returns");
     }
 }
 
@@ -140,25 +139,27 @@ fn about_output(page: &mut Page, draft: &Draft, preflight: &Preflight, plan: &Pl
     page.need(draft.lines_of("output"));
     let cell = cell(preflight);
     let raster = format!("raster = {{ resolution = {cell} }}");
-    page.offer("format = \"glb\"", "one file, as for Blender; \"3dtiles\" writes tiles for the web alone");
-    page.offer("compression = \"none\"", "plain glTF, larger: QGIS needs it");
-    if let Some((option, what)) = max_error(preflight, plan).filter(|_| !draft.sets("max_error")) {
-        page.offer(&option, &what);
+    let mut offer = |option: &str, what: &str| offer_unset(page, draft, option, what);
+    offer("format = \"glb\"", "one file, as for Blender; \"3dtiles\" writes tiles for the web alone");
+    offer("compression = \"none\"", "plain glTF, larger: QGIS needs it");
+    if let Some((option, what)) = max_error(preflight, plan) {
+        offer(&option, &what);
     }
-    page.offer("max_edge = \"auto\"", "leaves long triangles out, as over water; or a length such as 30.0");
-    if !draft.sets("raster") {
-        page.offer(&raster, "also writes the heights as terrain.tif, with cells of this side");
-    }
-    if !draft.sets("export") {
-        page.offer(
-            "export = [\"landxml\"]",
-            "also writes terrain.xml for CAD; \"dxf\", \"obj\" and \"ply\" for other programs",
-        );
-    }
-    page.offer("height_offset = \"egm96\"", "if heights are above sea level: corrects them on the globe");
-    page.offer("copyright = \"(c) whose data\"", "copyright notice in every file, shown by viewers");
+    offer("max_edge = \"auto\"", "leaves long triangles out, as over water; or a length such as 30.0");
+    offer(&raster, "also writes the heights as terrain.tif, with cells of this side");
+    offer("export = [\"landxml\"]", "also writes terrain.xml for CAD; \"dxf\", \"obj\" and \"ply\" for other programs");
+    offer("height_offset = \"egm96\"", "if heights are above sea level: corrects them on the globe");
+    offer("copyright = \"(c) whose data\"", "copyright notice in every file, shown by viewers");
     if is_built_in() {
-        page.offer("page = true", "also writes a viewer for any web server");
+        offer("page = true", "also writes a viewer for any web server");
+    }
+}
+
+/// Offers an option, unless the job sets it.
+fn offer_unset(page: &mut Page, draft: &Draft, option: &str, what: &str) {
+    let key = option.split(' ').next().unwrap_or(option);
+    if !draft.sets(key) {
+        page.offer(option, what);
     }
 }
 

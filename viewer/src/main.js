@@ -332,7 +332,8 @@ class Viewer {
   }
 
   imagesFailed(error) {
-    this.imagesError = `Some images cannot be loaded: ${error.message}`;
+    const host = this.template ? new URL(this.template).host : 'the server';
+    this.imagesError = `Images of ${host} cannot be loaded (${error.message}): no connection, or the server sends no CORS headers.`;
     this.panel?.reflect();
   }
 

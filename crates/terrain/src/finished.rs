@@ -69,7 +69,7 @@ impl FinishedTerrain {
     /// something is not as the job wrote it, [`sys::Error::Io`].
     pub fn open(directory: &Path) -> Result<FinishedTerrain> {
         if !directory.is_dir() {
-            let what = if directory.exists() { "is not a directory" } else { "is not there" };
+            let what = if directory.exists() { "is a file" } else { "is not there" };
             return Err(no_output(directory, what).into());
         }
         refuse_unfinished(directory)?;
@@ -168,7 +168,10 @@ impl FinishedTerrain {
 }
 
 fn no_output(path: &Path, what: &str) -> sys::Error {
-    sys::Error::Config(format!("{} {what}: name the output directory of a finished job", path.display()))
+    sys::Error::Config(format!(
+        "{} {what}: name the output directory of a finished job, such as the cloud-terrain that `gdt-batch cloud.laz` writes",
+        path.display()
+    ))
 }
 
 fn read_report(output: &OutputFiles) -> Result<ReportFacts> {

@@ -57,15 +57,16 @@ impl<'a> Summary<'a> {
     }
 
     fn exactness(&self) -> String {
-        let Report { lattice, unit, selection, .. } = self.report;
+        let Report { lattice, unit, selection, heights, .. } = self.report;
         let step = match lattice.resolution == lattice.resolution_z {
             true => format!("{} {unit}", lattice.resolution),
             false => format!("{} {unit}, heights {}", lattice.resolution, lattice.resolution_z),
         };
         match selection {
             Some(SelectionReport { points, max_error, greatest_error, mean_error, .. }) => format!(
-                "Delaunay triangulation; all {} points are within {max_error} of it (at most {greatest_error:.3}, mean {mean_error:.4})",
-                grouped(*points)
+                "Delaunay triangulation; all {} points are within {max_error}{} of it (at most {greatest_error:.3}, mean {mean_error:.4})",
+                grouped(*points),
+                heights.as_ref().map_or(String::new(), |heights| format!(" {}", heights.unit))
             ),
             None => format!("Delaunay triangulation of coordinates in steps of {step}"),
         }
@@ -150,6 +151,7 @@ impl fmt::Display for Summary<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut row = |name: &str, value: &str| writeln!(f, "{name:<9} {value}");
         row("terrain", &self.made())?;
+        self.report.heights.as_ref().map_or(Ok(()), |heights| row("heights", &heights.to_string()))?;
         if let Some(surface) = &self.report.surface {
             row("surface", &(self.words)(surface))?;
         }

@@ -468,7 +468,7 @@ fn write_map_tiles(run: &WholeRun, plan: &Plan, raster: &RasterWork) -> Result<O
 /// Those of [`ContourWork`].
 fn write_contours(run: &WholeRun, plan: &Plan, frame: &Frame, tiles: &dyn EachTile) -> Result<Option<ContourStats>> {
     let Some(work) = ContourWork::of(plan, frame, tiles)? else { return Ok(None) };
-    let stage = run.progress.stage("contours", work.steps(), "tiles and levels");
+    let stage = run.progress.stage("contours", work.steps(), "steps");
     let stats = run.journal.step(JobStep::Contours, || work.write(run.directory, &|steps| stage.advance(steps)))?;
     run.add_stage(stage.finish());
     Ok(Some(stats))
