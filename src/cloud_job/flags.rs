@@ -17,7 +17,7 @@ pub(crate) struct Flag {
 }
 
 /// The flags that are lines of a configuration and no paths.
-const FLAGS: [Flag; 16] = [
+const FLAGS: [Flag; 17] = [
     Flag { name: "surface", table: "input", key: "surface", value: |given| text(&given.surface) },
     Flag {
         name: "bounds",
@@ -42,7 +42,13 @@ const FLAGS: [Flag; 16] = [
     Flag { name: "raster", table: "output", key: "raster", value: |given| given.raster.map(raster) },
     Flag { name: "export", table: "output", key: "export", value: |given| words(&given.export) },
     Flag { name: "contours", table: "output", key: "contours", value: contours },
-    Flag { name: "page", table: "output", key: "page", value: |given| given.page.then(|| true.into()) },
+    Flag {
+        name: "page",
+        table: "output",
+        key: "page",
+        value: |given| (given.page || given.imagery.is_some()).then(|| true.into()),
+    },
+    Flag { name: "imagery", table: "output", key: "imagery", value: |given| text(&given.imagery) },
     Flag { name: "terrain", table: "output", key: "terrain", value: |given| given.terrain.then(terrain) },
 ];
 

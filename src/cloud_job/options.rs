@@ -36,6 +36,9 @@ pub struct CloudOptions {
     /// Also write index.html, a page that shows the terrain: put the output on a web server.
     #[arg(long)]
     pub page: bool,
+    /// Write the page, which drapes map tiles over the terrain, such as https://tiles.example.org/{z}/{x}/{y}.png.
+    #[arg(long, value_name = "URL")]
+    pub imagery: Option<String>,
     /// Also write terrain tiles for globes such as CesiumJS to terrain/. They need --height-offset if heights are above sea level.
     #[arg(long)]
     pub terrain: bool,

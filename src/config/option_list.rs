@@ -183,6 +183,7 @@ mod tests {
             ("[output.raster]", "products", &["height", "hillshade", "slope", "aspect"]),
             ("[output.raster]", "pmtiles", &["terrarium", "terrain-rgb"]),
             ("[output]", "copyright", &[]),
+            ("[output]", "imagery", &[]),
         ] {
             assert_eq!(ConfigOption::find(table, key).unwrap().choices(), choices, "{table} {key}");
         }

@@ -22,7 +22,7 @@ use crate::view::results::Results;
 use crate::view::server::Server;
 use crate::view::site::Site;
 use tiles::file_names::OutputFiles;
-use tiles::page::page_for;
+use tiles::page::{imagery_of, page_for};
 
 /// A terrain that waits for browsers: `Display` is for people, `Serialize` for programs.
 #[derive(Serialize)]
@@ -50,7 +50,11 @@ impl View {
         let root = directory.canonicalize().map_err(sys::Error::io("read", directory))?;
         let listener = TcpListener::bind(wanted).map_err(|error| not_listening(wanted, &error))?;
         let bound = listener.local_addr().map_err(sys::Error::io("listen on", wanted.to_string()))?;
-        let (results, page, hosts) = (Results::new(&root), page_for(terrain)?, Hosts::new(hosts));
+        let (results, page, hosts) = (
+            Results::new(&root),
+            page_for(terrain, imagery_of(&OutputFiles::new(&root).page()).as_ref())?,
+            Hosts::new(hosts),
+        );
         let site = Site { results, root, page, hosts, cors };
         // An address such as 0.0.0.0 stands for all of this machine.
         let shown = if wanted.ip().is_unspecified() { "localhost".into() } else { ip_text(wanted.ip()) };

@@ -48,6 +48,7 @@ fn the_full_configuration_shows_every_option_with_its_default() {
     (full.input.classes, full.input.bounds, full.input.heights) = (None, None, None);
     // What they show is no default either.
     assert!(full.output.height_offset.take().is_some() && full.output.copyright.take().is_some());
+    assert!(full.output.imagery.take().is_some());
     assert!(full.output.raster.take().is_some_and(|raster| raster.nodata == Default::default()));
     assert!(!std::mem::take(&mut full.output.export).is_empty());
     assert!(full.output.contours.take().is_some() && full.output.terrain.take().is_some());

@@ -138,6 +138,29 @@ fn images_of_a_map_service_cover_the_terrain_once_the_user_names_it() {
 }
 
 #[test]
+fn a_job_can_give_its_page_the_images_of_a_map_service() {
+    let Some(chromium) = chromium() else { return };
+    let service = MapService::start();
+    let output = format!("format = \"3dtiles\"\npage = true\nimagery = \"{}{{z}}/{{x}}/{{-y}}.png\"", service.url);
+    let terrain = Terrain::new("crs = \"EPSG:26910\"", &output);
+    let points = terrain.folder.path().join("points.png");
+    let steps = json!([
+        {"size": [1280, 800], "dark": false},
+        {"wait": format!("document.getElementById('attribution').textContent.includes('Images') && {SHOWN}"), "shot": terrain.picture()},
+        {"run": "location.hash"},
+        {"run": "location.hash = 'images=none'"},
+        {"wait": format!("!document.getElementById('attribution').textContent.includes('Images') && {SHOWN}"), "shot": points},
+    ]);
+    let seen = terrain.opened(&chromium, &steps, Some(&service.url));
+    assert!(
+        !seen["values"][0].as_str().unwrap().contains("images"),
+        "what the page is written with is no part of its address: {seen}"
+    );
+    let [draped, without] = [terrain.picture(), points].map(|path| share_of(2, &path));
+    assert!(draped > 0.2 && without < 0.01, "{draped} and {without} of the pictures are blue");
+}
+
+#[test]
 fn a_lake_is_blue_where_colours_stand_for_heights() {
     let Some(chromium) = chromium() else { return };
     let terrain = Terrain::new("", "format = \"3dtiles\"\ncolor = \"elevation\"");

@@ -21,7 +21,11 @@ export function isTemplate(text) {
 
 const hostOf = (template) => new URL(absoluteTemplate(template)).origin;
 
-const { images } = readLink();
+// The template that the page has been written with.
+const written = document.documentElement.dataset.images;
+export const usualImages = isTemplate(written) ? absoluteTemplate(written) : null;
+
+const images = readLink().images ?? usualImages;
 const imageHost = isTemplate(images) ? hostOf(images) : '';
 
 document.head.append(Object.assign(document.createElement('meta'), {

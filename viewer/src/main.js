@@ -1,6 +1,6 @@
 // The page: opens the terrain, draws it when something has changed, and joins the panel, the mouse and the keys to it.
 // First, so that the policy holds for all that follows.
-import { absoluteTemplate, isTemplate, mayAsk } from './hosts.js';
+import { absoluteTemplate, isTemplate, mayAsk, usualImages } from './hosts.js';
 import { CanvasTexture, PerspectiveCamera, Scene, Sprite, SpriteMaterial, Vector3, WebGLRenderer } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
@@ -267,19 +267,19 @@ class Viewer {
     const values = {
       view: this.isWhole ? null : this.viewText(),
       move: this.walk.isOn ? 'walk' : null,
-      colours: mode === 'points' ? null : mode,
+      colours: mode === this.usualMode ? null : mode,
       exaggeration: exaggeration === this.usual ? null : String(exaggeration),
       sun: String(sun) === String(USUAL_SUN) ? null : writeNumbers(sun, 0),
       light: this.isShaded ? null : 'off',
       edges: this.dressing.showsEdges ? 'on' : null,
-      images: template,
+      images: template === usualImages ? null : template ?? 'none',
     };
     return Object.fromEntries(Object.entries(values).filter(([, value]) => value));
   }
 
   // Shows what an address says. What it does not say becomes as usual.
   show(values) {
-    const { view, move, colours, exaggeration, sun, light, edges, images } = values;
+    const { view, move, colours, exaggeration, sun, light, edges, images = usualImages } = values;
     const factor = Number(exaggeration);
     if (isTemplate(images) && !mayAsk(images)) {
       location.reload();
@@ -292,9 +292,14 @@ class Viewer {
     this.edges = edges === 'on';
     this.images = isTemplate(images) ? images : null;
     const isKnown = MODES.includes(colours) && (colours !== 'images' || this.template);
-    this.colors = isKnown ? colours : 'points';
+    this.colors = isKnown ? colours : this.usualMode;
     this.lookAgain(readNumbers(view, 6), move === 'walk');
     this.panel?.reflect();
+  }
+
+  // Images are shown where there are some.
+  get usualMode() {
+    return this.template ? 'images' : 'points';
   }
 
   viewText() {

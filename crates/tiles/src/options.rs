@@ -64,6 +64,9 @@ pub struct OutputOptions {
     /// Whether a page that shows the terrain is written beside it.
     #[serde(default, deserialize_with = "page")]
     pub page: bool,
+    /// The map tiles that the page drapes over the terrain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imagery: Option<ImageryUrl>,
     /// The raster of heights, if there is to be one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub raster: Option<RasterOptions>,
@@ -130,6 +133,41 @@ fn is_no_text(character: char) -> bool {
 impl From<Copyright> for String {
     fn from(copyright: Copyright) -> String {
         copyright.0
+    }
+}
+
+/// A template of the URLs of map tiles in Web Mercator.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct ImageryUrl(String);
+
+impl ImageryUrl {
+    /// Returns the template.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl TryFrom<String> for ImageryUrl {
+    type Error = String;
+
+    fn try_from(text: String) -> std::result::Result<ImageryUrl, String> {
+        let is_url = ["https://", "http://"].iter().any(|scheme| text.starts_with(scheme));
+        let is_template =
+            text.contains("{z}") && text.contains("{x}") && (text.contains("{y}") || text.contains("{-y}"));
+        let is_plain = !text.chars().any(|c| c.is_control() || c.is_whitespace() || matches!(c, '"' | '<' | '>'));
+        match is_url && is_template && is_plain {
+            true => Ok(ImageryUrl(text)),
+            false => Err("imagery is the URL of map tiles with {z}, {x} and {y} or {-y}, such as \
+                          \"https://tiles.example.org/{z}/{x}/{y}.png\""
+                .into()),
+        }
+    }
+}
+
+impl From<ImageryUrl> for String {
+    fn from(url: ImageryUrl) -> String {
+        url.0
     }
 }
 

@@ -16,6 +16,7 @@ use sys::{Error, Result, disk};
 use tiles::breakline_list::lines_of;
 use tiles::frame::Frame;
 use tiles::gltf::one_file::{write_remade_terrain, write_terrain};
+use tiles::options::ImageryUrl;
 use tiles::page::page_for;
 use tiles::preview::canvas::{Canvas, PreviewPixel};
 use tiles::preview::layout::world_file;
@@ -35,6 +36,8 @@ pub(crate) struct SideFiles<'a> {
     pub flat: Option<FlatScene<'a>>,
     /// Whether there is to be a page that shows the terrain.
     pub page: bool,
+    /// The map tiles that it drapes over the terrain.
+    pub imagery: Option<&'a ImageryUrl>,
     /// Whose the data are, if the user says.
     pub copyright: Option<&'a str>,
     /// Whether colours stand for heights in the preview.
@@ -70,7 +73,7 @@ pub(crate) fn write_side_files(
     if content.page {
         let opened = if content.tileset.is_some() { output.tileset() } else { output.terrain() };
         let name = opened.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        files.push(write_pending(&output.page(), page_for(&name)?.as_bytes())?);
+        files.push(write_pending(&output.page(), page_for(&name, content.imagery)?.as_bytes())?);
     }
     if content.one_file {
         let written = |path: PathBuf| Ok(disk::exists(&path).map_err(Error::io("read", &path))?.then_some(path));

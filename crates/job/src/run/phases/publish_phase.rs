@@ -382,6 +382,9 @@ fn publish(
     );
     let tiles = &written.stats;
     let fits = fits_one_file(tiles);
+    if output.imagery.is_some() && !output.page {
+        warnings.push("[output] imagery has no effect: the page shows it; fix: [output] page = true".to_string());
+    }
     let page_of_others = output.page && run.directory.has_page_of_others()?;
     if page_of_others {
         let page = run.directory.results().page();
@@ -398,6 +401,7 @@ fn publish(
         one_file: fits && output.format != OutputFormat::Tiles3d,
         flat: flat_scene(plan, &appearance.style, bounds),
         page: output.page && !page_of_others,
+        imagery: output.imagery.as_ref(),
         copyright: output.copyright(),
         has_ramp: matches!(
             appearance.style.colors,
