@@ -116,7 +116,10 @@ fn a_command_line_without_a_readable_configuration_is_refused() {
     gdt_batch(folder.path(), &["no.toml"]).refused(2, &["no configuration file no.toml"]);
     fs::write(folder.path().join("old.toml"), b"[input]\nfiles = [\"Stra\xdfe.laz\"]\n").unwrap();
     gdt_batch(folder.path(), &["old.toml"]).refused(2, &["old.toml: line 2 has the byte 0xdf, which is not UTF-8"]);
-    gdt_batch(folder.path(), &["check", "."]).refused(2, &["cannot read the configuration"]);
+    gdt_batch(folder.path(), &["check", "."]).refused(2, &[". is a folder, not a configuration", "gdt-batch verify"]);
+    fs::write(folder.path().join("cloud.las"), b"LASF\0\0").unwrap();
+    gdt_batch(folder.path(), &["check", "cloud.las"])
+        .refused(2, &["cloud.las: this is a point cloud, not a configuration", "--write-config"]);
     fs::write(folder.path().join("binary.toml"), [0xff, 0xfe, 0x00]).unwrap();
     gdt_batch(folder.path(), &["binary.toml"]).refused(2, &["binary.toml"]);
     gdt_batch(folder.path(), &["--no-such-option"]).refused(2, &["--no-such-option"]);

@@ -227,7 +227,7 @@ fn heights_beside_feet_are_warned_of_until_their_unit_is_known() {
         square(6, 500.0, [0.0; 2]).into_iter().map(|[x, y, z]| format!("{},{},{z}\n", 1_000_000 + x, 900_000 + y));
     fs::write(&oregon, "x,y,z\n".to_string() + &rows.collect::<String>()).unwrap();
     let moved = || {
-        let job = Job::on(&[&oregon]).with("input", "crs = \"EPSG:2992\"\nto_crs = \"EPSG:32610\"");
+        let job = Job::on(&[&oregon]).with("input", "crs = \"EPSG:2992\"\nto_crs = \"EPSG:26910\"");
         job.with("output", "height_offset = 0.0")
     };
     let said = warnings(&moved().report());

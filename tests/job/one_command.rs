@@ -118,7 +118,7 @@ fn the_written_configuration_has_the_flags_and_offers_none_of_them_again() {
         "max_error = 0.1",
         "raster = { resolution = 1.0 }",
         "export = [\"landxml\", \"dxf\"]",
-        "contours = { interval = 2.0 }",
+        "contours = { dxf = true, interval = 2.0 }",
         "terrain = { format = \"quantized-mesh\" }",
         "directory = \"my tiles-terrain\"",
         "files = [\"my tiles/*.laz\"]",

@@ -141,7 +141,7 @@ fn images_of_a_map_service_cover_the_terrain_once_the_user_names_it() {
 fn a_job_can_give_its_page_the_images_of_a_map_service() {
     let Some(chromium) = chromium() else { return };
     let service = MapService::start();
-    let output = format!("format = \"3dtiles\"\npage = true\nimagery = \"{}{{z}}/{{x}}/{{-y}}.png\"", service.url);
+    let output = format!("format = \"3dtiles\"\nimagery = \"{}{{z}}/{{x}}/{{-y}}.png\"", service.url);
     let terrain = Terrain::new("crs = \"EPSG:26910\"", &output);
     let points = terrain.folder.path().join("points.png");
     let steps = json!([

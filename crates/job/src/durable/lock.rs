@@ -4,6 +4,8 @@ use crate::{Error, Result};
 use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 use sys::disk;
 use sys::disk::WriteFrom;
 
@@ -13,6 +15,12 @@ pub struct Lock {
     _file: File,
     is_real: bool,
 }
+
+/// A process that was killed may hold its lock for so long, while the system takes its memory back.
+const DYING: Duration = Duration::from_secs(1);
+
+/// Between two tries to take a lock.
+const BETWEEN_TRIES: Duration = Duration::from_millis(50);
 
 /// What the lock file says while tasks share the lock.
 const TASKS: &str = "another task of this job";
@@ -34,7 +42,13 @@ impl Lock {
             ))
             .into());
         }
-        Lock::take_within(job)
+        let begun = Instant::now();
+        loop {
+            match Lock::take_within(job) {
+                Err(Error::InUse { .. }) if begun.elapsed() < DYING => thread::sleep(BETWEEN_TRIES),
+                outcome => return outcome,
+            }
+        }
     }
 
     /// Creates the folder `job` within a job directory if need be and takes its lock. Whatever is there is the job's own: a power failure

@@ -19,7 +19,7 @@ use crate::report::breakline_report::BreaklineReport;
 use crate::report::change_counts::ChangeCounts;
 use crate::report::clip_report::ClipReport;
 use crate::report::covered_share::covered_share;
-use crate::report::height_span::HeightSpan;
+use crate::report::extent::Extent;
 use crate::report::selection_report::SelectionReport;
 use crate::tiles::vertex_colors::ColorSource;
 use crate::tiles::write_tile::TileStats;
@@ -51,9 +51,9 @@ pub struct Report {
     /// The points on the ground, which vertices are taken from; `None` unless `surface = "bare-earth"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground: Option<u64>,
-    /// Between which heights the vertices lie.
+    /// The box around the vertices.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub heights: Option<HeightSpan>,
+    pub extent: Option<Extent>,
     /// Triangles in all tiles.
     pub triangles: u64,
     /// Triangles that `hull`, `max_edge` or `clip` left out. They are in `cut`.
@@ -326,7 +326,7 @@ impl Report {
             sites: parts.leaves.sites,
             selection: parts.selection,
             ground: parts.ground,
-            heights: parts.leaves.bounds.map(|bounds| HeightSpan::of(plan, &bounds)),
+            extent: parts.leaves.bounds.map(|bounds| Extent::of(plan, bounds)),
             triangles: parts.tiles.triangles,
             cut_triangles: parts.tiles.cut_triangles,
             hull_triangles: parts.tiles.slivers,
@@ -347,7 +347,9 @@ impl Report {
             skipped: plan.skipped.clone(),
             surface: match parts.ground {
                 Some(ground) => {
-                    Some(format!("bare earth: {} of the points are on the ground", percent(ground, parts.points.kept)))
+                    let [found, kept] = [ground, parts.points.kept].map(grouped);
+                    let share = percent(ground, parts.points.kept);
+                    Some(format!("bare earth: {found} of {kept} points are on the ground ({share})"))
                 }
                 None => SurfaceShares::of_kept(&parts.points).sentence(plan.options.input.mesh_of()),
             },

@@ -4,7 +4,7 @@ pub mod breakline_report;
 pub mod change_counts;
 pub mod clip_report;
 mod covered_share;
-pub mod height_span;
+pub mod extent;
 pub mod job_report;
 pub mod job_status;
 pub mod selection_report;

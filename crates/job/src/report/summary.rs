@@ -53,11 +53,15 @@ impl<'a> Summary<'a> {
         // 100 % is shown only where it is exact.
         let share = (*covered_share)?;
         let shown = if share < 1.0 { (share * 1000.0).floor() / 10.0 } else { 100.0 };
-        Some(format!("{shown} % of {area}"))
+        let rest = match share < 1.0 {
+            true => ": the rest has no points, or slivers that [output] hull left out",
+            false => "",
+        };
+        Some((self.words)(&format!("{shown} % of {area}{rest}")))
     }
 
     fn exactness(&self) -> String {
-        let Report { lattice, unit, selection, heights, .. } = self.report;
+        let Report { lattice, unit, selection, extent, .. } = self.report;
         let step = match lattice.resolution == lattice.resolution_z {
             true => format!("{} {unit}", lattice.resolution),
             false => format!("{} {unit}, heights {}", lattice.resolution, lattice.resolution_z),
@@ -66,7 +70,7 @@ impl<'a> Summary<'a> {
             Some(SelectionReport { points, max_error, greatest_error, mean_error, .. }) => format!(
                 "Delaunay triangulation; all {} points are within {max_error}{} of it (at most {greatest_error:.3}, mean {mean_error:.4})",
                 grouped(*points),
-                heights.as_ref().map_or(String::new(), |heights| format!(" {}", heights.unit))
+                extent.as_ref().map_or(String::new(), |extent| format!(" {}", extent.height_unit))
             ),
             None => format!("Delaunay triangulation of coordinates in steps of {step}"),
         }
@@ -151,7 +155,7 @@ impl fmt::Display for Summary<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut row = |name: &str, value: &str| writeln!(f, "{name:<9} {value}");
         row("terrain", &self.made())?;
-        self.report.heights.as_ref().map_or(Ok(()), |heights| row("heights", &heights.to_string()))?;
+        self.report.extent.as_ref().map_or(Ok(()), |extent| row("size", &extent.to_string()))?;
         if let Some(surface) = &self.report.surface {
             row("surface", &(self.words)(surface))?;
         }
