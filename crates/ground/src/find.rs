@@ -5,14 +5,15 @@
 //! What they cut off where the ground goes on smoothly comes back, cell by cell, but not regions that fall off on most sides. So does what lies near
 //! the surface of the others. At last each cell is compared with the plane of the ground around it.
 //!
-//! Each pass looks at no more than what the one before has left, within a bounded distance or along a region that came back. So the result depends on
-//! the lowest points alone.
+//! Each pass looks at no more than what the one before has left: within a bounded distance, along a region that came back, or in the pyramid that fills
+//! gaps. So the result depends on the lowest points alone.
 //! It is computed in single precision, by additions, multiplications, divisions, square roots and comparisons in a fixed order, which have the same
 //! bits on every machine.
 
 use crate::cells::Cells;
 use crate::fill::filled;
 use crate::morphology::{EMPTY, dilation, erosion};
+use crate::pits::without_pits;
 use crate::plane::{from_middle, with_surroundings};
 use crate::regions::ground_regions;
 use crate::sizes::GroundSizes;
@@ -20,12 +21,7 @@ use crate::slope::slopes;
 use crate::terrain::{NEIGHBOUR, Terrain};
 
 /// The radius of three by three cells, in cells.
-const NEIGHBOURS: f64 = 1.5;
-/// A pit is noise if a closing by its neighbours lies so many widths of a cell above it ...
-const PIT: f32 = 3.0;
-/// ... and so many metres at least everywhere within so many metres. Else it is ground between trees.
-const LEAST_PIT: f32 = 1.0;
-const PIT_REACH: f64 = 10.0;
+pub(crate) const NEIGHBOURS: f64 = 1.5;
 /// Discs have their middles and their cells no farther than this from points, in metres.
 const EXTENSION: f64 = 4.0;
 /// Up to this radius in metres discs grow by a metre, up to the next by two, and then by a tenth.
@@ -112,20 +108,8 @@ fn kept_cells<E>(
 }
 
 /// Returns `heights` in the cells that are `wanted`.
-fn only_where(heights: &Cells<f32>, wanted: &Cells<bool>) -> Cells<f32> {
+pub(crate) fn only_where(heights: &Cells<f32>, wanted: &Cells<bool>) -> Cells<f32> {
     heights.with(wanted, EMPTY, |height, is_wanted| if is_wanted { height } else { EMPTY })
-}
-
-/// Returns the lowest points without those that are pits among their neighbours.
-fn without_pits(lowest: &Cells<f32>, width: f64) -> Cells<f32> {
-    let has_point = &lowest.each(false, |height| height != EMPTY);
-    let highest = only_where(&dilation(lowest, NEIGHBOURS), has_point);
-    let closed = only_where(&erosion(&highest, NEIGHBOURS), has_point);
-    let around = erosion(&closed, PIT_REACH / width);
-    let deep = PIT * width as f32;
-    let is_pit = lowest.with(&closed, false, |height, closed| height != EMPTY && closed - height > deep);
-    let is_noise = lowest.with(&around, false, |height, around| height != EMPTY && around - height > LEAST_PIT);
-    only_where(lowest, &is_pit.with(&is_noise, false, |is_pit, is_noise| !(is_pit && is_noise)))
 }
 
 /// Returns for each cell the radius in metres of the last opening that cut it off the `surface`, which is there where discs may reach; 0 if none
@@ -163,6 +147,10 @@ fn radii(greatest: f64) -> Vec<f64> {
     while next <= greatest {
         radii.push(next);
         next *= 1.1;
+    }
+    // A building just so wide is cut off.
+    if radii.last().is_some_and(|last| *last < greatest) {
+        radii.push(greatest);
     }
     radii
 }
@@ -255,7 +243,7 @@ mod tests {
     #[test]
     fn discs_grow_up_to_the_largest_building() {
         assert_eq!(radii(20.0), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0]);
-        assert_eq!(radii(2.5), [1.0, 2.0]);
-        assert_eq!(radii(25.0).len(), 15);
+        assert_eq!(radii(2.5), [1.0, 2.0, 2.5]);
+        assert_eq!(radii(25.0).len(), 16);
     }
 }

@@ -10,6 +10,7 @@ mod ground;
 mod lowest;
 mod metric_lattice;
 mod morphology;
+mod pits;
 mod plane;
 mod regions;
 mod sizes;
