@@ -33,6 +33,7 @@ use delaunay::geometry::REACH;
 use ground::MetricLattice;
 use lattice::{AxisMap, Lattice, shortest_decimal};
 use points::lines::line_crs::SystemOfPoints;
+use points::lines::options::LineHeights;
 use points::options::{OnBadFile, UnitChoice};
 use points::surface_warnings::no_ground;
 use points::transform_sources::transform_sources;
@@ -174,6 +175,7 @@ fn try_plan(
     let height_metres = crs.vertical.or(is_known.then_some(metres));
     let system = SystemOfPoints { crs: &crs, height_metres, datums: options.input.datums };
     let lines = LineFiles::read(options, &system, &mut warnings)?;
+    warnings.extend(heights_above_ground(options));
     // The outline of an area is seldom as exact as a datum, and moves no point.
     let clip = ClipFile::read(options, &SystemOfPoints { datums: DatumRule::Close, ..system }, &mut warnings)?;
     let wanted = &mut options.clone();
@@ -304,6 +306,17 @@ fn refuse_contradicting_options(options: &JobOptions) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Returns what the user should know about breaklines with heights from the points, where the mesh has those on the ground alone: they are found
+/// later.
+fn heights_above_ground(options: &JobOptions) -> Option<String> {
+    let takes_points = options.breaklines.iter().any(|lines| lines.heights == LineHeights::Points);
+    (takes_points && options.input.finds_ground()).then(|| {
+        "[[breaklines]] heights = \"points\" takes the nearest points, which may be on trees and roofs, though surface = \"bare-earth\" leaves \
+         those out; fix: lines with heights of their own, or classified points with surface = \"ground\""
+            .into()
+    })
 }
 
 /// Returns what the user says of the coordinates of the sources. Of those that are transformed, the target says all.

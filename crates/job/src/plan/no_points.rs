@@ -67,8 +67,9 @@ pub fn no_point_is_left(plan: &Plan, counts: &PointCounts) -> crate::Error {
 /// Returns the error for a job whose points make no triangle.
 pub fn no_triangle(plan: &Plan) -> crate::Error {
     crate::Error::NoTerrain(format!(
-        "{}the points make no triangle in steps of {}: a triangle takes three different places in x and y that are not on one line",
+        "{}the points{} make no triangle in steps of {}: a triangle takes three different places in x and y that are not on one line",
         first_file(plan),
+        if plan.options.input.finds_ground() { " that bare-earth finds on the ground" } else { "" },
         plan.lattice.resolution
     ))
 }
