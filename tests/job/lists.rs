@@ -58,7 +58,7 @@ fn a_list_stands_for_its_files_and_those_outside_the_bounds_are_not_opened() {
     let report = Job::on(&[root.join("nowhere.vpc")]).with("input", bounds).report();
     assert_eq!(results(&report), results(&expected));
     let warnings = report["warnings"].to_string();
-    assert!(warnings.contains(r#"item \\\"b\\\" (number 2) has proj:bbox [30,null,60,30]"#), "{warnings}");
+    assert!(warnings.contains(r#"item \"b\" (number 2) has proj:bbox [30,null,60,30]"#), "{warnings}");
     // The third file is not there at all.
     let vpc = root.join("list.vpc");
     fs::write(&vpc, list(&[item("a", 0), item("b", 30), item("far", 60)])).unwrap();

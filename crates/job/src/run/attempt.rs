@@ -135,7 +135,10 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
                 // The work of many machines is not done again by one.
                 return Err(damaged_by_tasks(&job.directory));
             }
-            run.progress.note("what the interrupted run left is damaged; starting over");
+            run.progress.note(match options.updates {
+                true => "what the last run left is damaged; everything is computed again",
+                false => "what the interrupted run left is damaged; starting over",
+            });
             continue;
         }
         // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.

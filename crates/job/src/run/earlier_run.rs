@@ -118,7 +118,8 @@ impl EarlierRun {
         let old = self.header.as_ref().filter(|old| old.coarsening == header.coarsening)?;
         let is_update = header.fingerprint.updates() && header.fingerprint.may_update(&old.fingerprint);
         let first = is_update.then(|| first_plan(directory)).flatten();
-        if is_update && self.is_finished && first.is_none() {
+        // A job of a single part, whose nodes above it have a journal too, is computed as a whole in any case.
+        if is_update && self.is_finished && first.is_none() && self.parts.0.len() > 2 {
             let path = directory.first_plan();
             progress.note(&format!("{} is missing or damaged: everything is computed again", path.display()));
         }
