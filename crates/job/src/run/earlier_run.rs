@@ -95,9 +95,10 @@ impl EarlierRun {
             Ok(file.is_whole(directory) || file.is_in_place(directory))
         };
         let names = self.results(directory).map(|file| file.name.clone()).collect();
-        // The report takes its place last. After that the journals go.
+        // The report takes its place last. After that the journals go, but not those of an update: if they name fewer results than the list,
+        // they are damaged, and what they do not name must stay.
         let report = directory.name(&directory.results().report());
-        let is_last = |file: &PublishedFile| file.name == report && file.is_in_place(directory);
+        let is_last = |file: &PublishedFile| !updates && file.name == report && file.is_in_place(directory);
         let are_all = has_report && (self.results(directory).any(is_last) || are_all_results(directory, &names)?);
         if !are_all || !self.results(directory).try_fold(true, |all, file| Ok(all && is_whole(file)?))? {
             return Ok(());

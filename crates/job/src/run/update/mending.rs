@@ -117,11 +117,16 @@ fn in_job(directory: &JobDirectory, name: &Path) -> PathBuf {
 }
 
 /// Tells whether the results in place may be those of an earlier run than the one that wrote `files`: neither the list nor the report is its
-/// own, and the report is whole, or removed so that others can take their places.
+/// own, and the report is whole, or removed so that others can take their places. While they do, the list of changes waits; afterwards it is in
+/// its place.
 fn are_earlier_results(directory: &JobDirectory, files: &[PublishedFile]) -> Result<bool> {
     let results = directory.results();
     let own = [results.report(), results.checksums()].map(|path| directory.name(&path));
     if files.iter().any(|file| own.contains(&file.name) && file.is_in_place(directory)) {
+        return Ok(false);
+    }
+    let is_there = |path: &Path| exists(path).map_err(Error::io("read", path));
+    if !is_there(&directory.changes())? && is_there(&results.changes())? {
         return Ok(false);
     }
     match read_file(&results.report()) {
@@ -224,8 +229,13 @@ mod tests {
         let directory = JobDirectory::new(output.path());
         let files = results(&directory, &[]);
         fs::write(directory.results().checksums(), "").unwrap();
-        let mended = Mended::of(&directory, files).unwrap();
-        assert_eq!(mended, Mended { is_interrupted: true, ..Mended::default() });
+        let mended = || Mended::of(&directory, files.clone()).unwrap();
+        assert_eq!(mended(), Mended { is_interrupted: true, ..Mended::default() });
         assert_eq!(fs::read(directory.results().checksums()).unwrap(), b"", "it tells what is outdated");
+        // A list of changes is in its place, and none waits: the results were there.
+        fs::write(directory.results().changes(), "{}").unwrap();
+        let put_back = paths(&["XXH128SUMS", "report.json", "tiles/000000.glb", "tiles/000001.glb"]);
+        assert_eq!(mended(), Mended { put_back, ..Mended::default() });
+        assert_ne!(fs::read(directory.results().checksums()).unwrap(), b"");
     }
 }
