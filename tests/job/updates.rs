@@ -163,6 +163,15 @@ fn results_that_were_changed_since_are_put_back() {
     for words in ["put back: report.json, tiles/000000.glb", "nothing else has changed since the last run"] {
         assert!(said.err.contains(words), "{said:?}");
     }
+    // Everything that a person sees.
+    let all = fs::read_dir(survey.job.out()).unwrap().map(|entry| entry.unwrap().path());
+    all.filter(|path| !path.ends_with("job")).for_each(|path| match path.is_dir() {
+        true => fs::remove_dir_all(&path).unwrap(),
+        false => fs::remove_file(&path).unwrap(),
+    });
+    let said = survey.update();
+    assert!(said.err.contains("put back: XXH128SUMS, ") && !said.err.contains("interrupted"), "{said:?}");
+    assert_eq!(fs::read(&tile).unwrap(), whole);
     // The same file, under both of its names.
     fs::write(&tile, "theirs").unwrap();
     let said = survey.update();

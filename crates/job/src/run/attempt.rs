@@ -31,7 +31,7 @@ use crate::run::part_entries::PartJournals;
 use crate::run::phases::do_phases;
 use crate::run::phases::plan_phase::note_skipped;
 use crate::run::phases::stage_costs::stage_costs;
-use crate::run::update::changes::end_without_changes;
+use crate::run::update::changes::{end_without_changes, mark_placed};
 use crate::run::update::first_plan_file::has_first_plan;
 use crate::run::update::mending::Mended;
 use crate::run::whole_run::WholeRun;
@@ -332,6 +332,7 @@ impl EndedRun<'_> {
             Ok(report) if updates && has_first_plan(directory)? => {
                 let results = directory.waiting_results();
                 directory.keep_results(&results.iter().map(|path| directory.name(path)).collect())?;
+                mark_placed(directory)?;
                 Ok(report)
             }
             Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),

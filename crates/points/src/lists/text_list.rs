@@ -46,7 +46,7 @@ pub(super) fn clouds_of(path: &Path) -> Result<Option<Vec<ListedCloud>>> {
         }
         if names_list(line) {
             return Err(refused(format!(
-                "{line:?} is a list, and a list takes point clouds; fix: write it into [input] files"
+                "{line:?} may be a list or a table, and a list names .las, .laz, ept.json, and texts such as .csv; fix: write it into [input] files"
             )));
         }
         if !names_cloud(line) {
@@ -162,7 +162,7 @@ mod tests {
         }
         for text in ["tiles.txt\n", "a.laz\nb.vpc\n"] {
             let error = clouds(text.as_bytes()).unwrap_err().to_string();
-            assert!(error.contains("is a list, and a list takes point clouds"), "{text:?}: {error}");
+            assert!(error.contains("may be a list or a table, and a list names .las"), "{text:?}: {error}");
         }
         let error = clouds(b"a.laz\nftp://host/b.laz\n").unwrap_err().to_string();
         assert!(error.contains("line 2: files can be read by https://"), "{error}");

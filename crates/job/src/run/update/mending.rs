@@ -7,11 +7,10 @@ use crate::durable::file_list::listed;
 use crate::durable::journal::PublishedFile;
 use crate::plan::fingerprint::first_few;
 use crate::progress::stage::ProgressOutput;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use sys::disk::{exists, is_one_file, link};
 use sys::{Error, Result, interrupt};
-use tiles::checksums::{list_text, parse_list, read_file, seal};
+use tiles::checksums::{list_text, parse_list, read_file};
 
 /// What became of the results of a finished run. Paths are from the output directory.
 #[derive(Debug, Default, PartialEq)]
@@ -31,7 +30,9 @@ impl Mended {
     /// [`Error::Io`] if a copy cannot be made.
     pub(crate) fn of(directory: &JobDirectory, mut files: Vec<PublishedFile>) -> Result<Mended> {
         files.sort_by(|a, b| a.name.cmp(&b.name));
-        let mut mended = Mended { is_interrupted: are_earlier_results(directory, &files)?, ..Mended::default() };
+        let mark = directory.placed_mark();
+        let is_interrupted = !exists(&mark).map_err(Error::io("read", &mark))?;
+        let mut mended = Mended { is_interrupted, ..Mended::default() };
         mended.write_list(directory, &files)?;
         for file in &files {
             interrupt::check()?;
@@ -116,30 +117,11 @@ fn in_job(directory: &JobDirectory, name: &Path) -> PathBuf {
     path.strip_prefix(directory.results().directory()).map(Path::to_path_buf).unwrap_or(path)
 }
 
-/// Tells whether the results in place may be those of an earlier run than the one that wrote `files`: neither the list nor the report is its
-/// own, and the report is whole, or removed so that others can take their places. While they do, the list of changes waits; afterwards it is in
-/// its place.
-fn are_earlier_results(directory: &JobDirectory, files: &[PublishedFile]) -> Result<bool> {
-    let results = directory.results();
-    let own = [results.report(), results.checksums()].map(|path| directory.name(&path));
-    if files.iter().any(|file| own.contains(&file.name) && file.is_in_place(directory)) {
-        return Ok(false);
-    }
-    let is_there = |path: &Path| exists(path).map_err(Error::io("read", path));
-    if !is_there(&directory.changes())? && is_there(&results.changes())? {
-        return Ok(false);
-    }
-    match read_file(&results.report()) {
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(true),
-        Err(e) => Err(Error::io("read", results.report())(e)),
-        Ok(text) => Ok(seal(&text).is_some_and(|(own, found)| own == found)),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::durable::atomic_file::find_pending;
+    use crate::run::update::changes::mark_placed;
     use std::collections::BTreeMap;
     use std::fs;
 
@@ -191,6 +173,7 @@ mod tests {
         let output = tempfile::tempdir().unwrap();
         let directory = JobDirectory::new(output.path());
         let files = results(&directory, &[output.path()]);
+        mark_placed(&directory).unwrap();
         let whole = contents(&directory);
         let mended = || Mended::of(&directory, files.clone()).unwrap();
         assert_eq!(mended(), Mended::default());
@@ -209,6 +192,7 @@ mod tests {
         let output = tempfile::tempdir().unwrap();
         let directory = JobDirectory::new(output.path());
         let mut files = results(&directory, &[output.path()]);
+        mark_placed(&directory).unwrap();
         let list = fs::read(directory.results().checksums()).unwrap();
         NAMES.iter().for_each(|name| damage(&directory.output().directory().join(name), false));
         let mended = Mended::of(&directory, files.clone()).unwrap();
@@ -232,8 +216,7 @@ mod tests {
         let mended = || Mended::of(&directory, files.clone()).unwrap();
         assert_eq!(mended(), Mended { is_interrupted: true, ..Mended::default() });
         assert_eq!(fs::read(directory.results().checksums()).unwrap(), b"", "it tells what is outdated");
-        // A list of changes is in its place, and none waits: the results were there.
-        fs::write(directory.results().changes(), "{}").unwrap();
+        mark_placed(&directory).unwrap();
         let put_back = paths(&["XXH128SUMS", "report.json", "tiles/000000.glb", "tiles/000001.glb"]);
         assert_eq!(mended(), Mended { put_back, ..Mended::default() });
         assert_ne!(fs::read(directory.results().checksums()).unwrap(), b"");
