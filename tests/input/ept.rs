@@ -174,12 +174,13 @@ fn points_that_lie_outside_their_nodes_are_named() {
     let axis = |name: &str, scale: &str, offset: f64| {
         format!("\"name\":\"{name}\",\"offset\":{offset:?},\"scale\":{scale},\"size\":4")
     };
-    for (kind, (name, offset)) in [
-        (NodeType::Binary, ("X", 500_000.0)),
-        (NodeType::Zstandard, ("Y", 4_000_000.0)),
-        (NodeType::Binary, ("Z", 0.0)),
+    for (kind, name, offset, wider) in [
+        (NodeType::Binary, "X", 500_000.0, "0.02"),
+        (NodeType::Zstandard, "Y", 4_000_000.0, "0.02"),
+        // Heights are small, and cells as high as they are wide.
+        (NodeType::Binary, "Z", 0.0, "1000.0"),
     ] {
-        for (scale, moved) in [("0.02", 0.0), ("0.01", 300.0)] {
+        for (scale, moved) in [(wider, 0.0), ("0.01", 300.0)] {
             let other = axis(name, scale, offset + moved);
             let error = error_of(kind, ALL, |files| {
                 files.edit("ept.json", replaced(&axis(name, "0.01", offset), &other));

@@ -104,7 +104,7 @@ fn time_to_wait(written: SystemTime, now: SystemTime) -> Duration {
     match now.duration_since(written) {
         Ok(age) => tick.saturating_sub(age),
         // A clock that is further ahead gives no time that this one gives soon.
-        Err(ahead) if ahead.duration() < tick => ahead.duration() + tick,
+        Err(ahead) if ahead.duration() < tick => ahead.duration().saturating_add(tick),
         Err(_) => Duration::ZERO,
     }
 }
