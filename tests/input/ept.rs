@@ -128,6 +128,12 @@ fn an_index_that_cannot_be_used_is_refused() {
         ("\"scale\":0.01", "\"scale\":0", "as the scale of x"),
         ("\"scale\":0.01", "\"scale\":0.001", "this node has another scale or offset than the index"),
         ("\"bounds\":[", "\"bounds\":[1e9, 1e9, 1e9, 0, 0, 0], \"other\":[", "not a cube"),
+        (
+            "\"version\":\"1.0.0\"",
+            "\"version\":\"2.0.0\"",
+            "has the version \"2.0.0\" of EPT: only versions 1.0 to 1.x",
+        ),
+        ("\"name\":\"Intensity\"", "\"name\":\"X\"", "has the dimension X twice"),
     ] {
         let error = error_of(NodeType::Laszip, ALL, |files| files.edit("ept.json", replaced(from, to)));
         assert!(error.contains(words), "{words}: {error}");
@@ -150,14 +156,60 @@ fn nodes_that_do_not_fit_the_hierarchy_are_named() {
         });
         assert!(error.contains(&words) && error.contains(name(kind)), "{error}");
     }
-    // A node whose points lie elsewhere loses points within bounds, so that it is no matter of trust.
-    let error = error_of(NodeType::Binary, SMALL, |files| {
-        let [east, west] = ["ept-data/1-1-1-1.bin", "ept-data/1-0-1-1.bin"];
-        let length = files.0[east].len();
-        let other = files.0[west].repeat(length / files.0[west].len() + 1);
-        files.edit(east, |bytes| bytes.copy_from_slice(&other[..length]));
-    });
-    assert!(error.contains("ept-data/1-1-1-1.bin lies outside its cell of the octree"), "{error}");
+}
+
+#[test]
+fn points_that_lie_outside_their_nodes_are_named() {
+    for bounds in [SMALL, ALL] {
+        let error = error_of(NodeType::Binary, bounds, |files| {
+            let [east, west] = ["ept-data/1-1-1-1.bin", "ept-data/1-0-1-1.bin"];
+            let length = files.0[east].len();
+            let other = files.0[west].repeat(length / files.0[west].len() + 1);
+            files.edit(east, |bytes| bytes.copy_from_slice(&other[..length]));
+        });
+        assert!(error.contains("point 0 of ") && error.contains("ept-data/1-1-1-1.bin, at (49"), "{error}");
+        assert!(error.contains("outside its cell of the octree"), "{error}");
+    }
+    // Records have no scale of their own. Each axis has another place in the schema.
+    let axis = |name: &str, scale: &str, offset: f64| {
+        format!("\"name\":\"{name}\",\"offset\":{offset:?},\"scale\":{scale},\"size\":4")
+    };
+    for (kind, name, offset, wider) in [
+        (NodeType::Binary, "X", 500_000.0, "0.02"),
+        (NodeType::Zstandard, "Y", 4_000_000.0, "0.02"),
+        // Heights are small, and cells as high as they are wide.
+        (NodeType::Binary, "Z", 0.0, "1000.0"),
+    ] {
+        for (scale, moved) in [(wider, 0.0), ("0.01", 300.0)] {
+            let other = axis(name, scale, offset + moved);
+            let error = error_of(kind, ALL, |files| {
+                files.edit("ept.json", replaced(&axis(name, "0.01", offset), &other));
+            });
+            assert!(error.contains("outside its cell of the octree: bounds, scale or offset"), "{other}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_box_of_the_points_beyond_the_octree_is_ignored() {
+    let mut files = EptFiles::of(&made(), NodeType::Binary);
+    files.edit("ept.json", replaced("\"boundsConforming\":[", "\"boundsConforming\":[0, 0, 0, 1, 1, 1], \"other\":["));
+    let folder = tempfile::tempdir().unwrap();
+    let source = open(&files.write(folder.path()), &TextOptions::default()).unwrap();
+    let warnings: Vec<&str> = source.warnings.iter().collect();
+    assert!(
+        warnings[0].contains("boundsConforming [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]], which are not within"),
+        "{warnings:?}"
+    );
+    assert!(source.min[0] < 500_000.0 && source.max[0] > 500_000.0);
+    assert_eq!(decode(&source, &rules(&source, &lattice(&source))).unwrap().1.kept, decode_all());
+}
+
+/// Returns the number of points of the cloud that are kept.
+fn decode_all() -> u64 {
+    let folder = tempfile::tempdir().unwrap();
+    let source = open(&EptFiles::of(&made(), NodeType::Binary).write(folder.path()), &TextOptions::default()).unwrap();
+    decode(&source, &rules(&source, &lattice(&source))).unwrap().1.kept
 }
 
 #[test]

@@ -250,6 +250,29 @@ fn files_that_are_no_area_and_areas_without_points_are_refused() {
 }
 
 #[test]
+fn local_coordinates_take_a_clip_without_a_crs() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = folder.path().join("cloud.csv");
+    let rows: String =
+        places(500, &[]).iter().map(|[x, y]| format!("{}.{},{}.{},1\n", x / 100, x % 9, y / 100, y % 9)).collect();
+    fs::write(&cloud, format!("x,y,z\n{rows}")).unwrap();
+    let clip = folder.path().join("area.geojson");
+    let job = Job::on(&[&cloud]).with("input", &format!("crs = \"none\"\nclip = {:?}", clip.display().to_string()));
+    // The first could be degrees.
+    for (far, code, words) in [(80, 2, "the points are in a plane without a CRS"), (150, 3, "has no CRS")] {
+        let area = |member: &str| {
+            let ring = format!("[[10, 10], [{far}, 10], [{far}, {far}], [10, 10]]");
+            fs::write(&clip, format!(r#"{{{member}"type": "Polygon", "coordinates": [{ring}]}}"#)).unwrap();
+        };
+        area("");
+        job.run().refused(code, &[words, "write the member \"crs\": null into it"]);
+        area(r#""crs": null, "#);
+        let points = &job.report()["points"];
+        assert!(number(&points["out_of_bounds"]) + number(&points["outside_clip"]) > 100, "{points}");
+    }
+}
+
+#[test]
 fn a_report_says_how_much_of_the_area_is_covered_and_the_next_job_what_it_replaces() {
     let folder = tempfile::tempdir().unwrap();
     let grid = folder.path().join("grid.csv");

@@ -51,6 +51,14 @@ fn a_list_stands_for_its_files_and_those_outside_the_bounds_are_not_opened() {
     let [a, b] = ["a", "b"].map(|name| root.join(format!("clouds/{name}.csv")));
     let bounds = "bounds = [0.0, 0.0, 55.0, 30.0]";
     let expected = Job::on(&[&a, &b]).with("input", bounds).report();
+    // An item without a usable box is opened.
+    let mut nowhere = item("b", 30);
+    nowhere["properties"]["proj:bbox"] = json!([30, null, 60, 30]);
+    fs::write(root.join("nowhere.vpc"), list(&[item("a", 0), nowhere])).unwrap();
+    let report = Job::on(&[root.join("nowhere.vpc")]).with("input", bounds).report();
+    assert_eq!(results(&report), results(&expected));
+    let warnings = report["warnings"].to_string();
+    assert!(warnings.contains(r#"item \"b\" (number 2) has proj:bbox [30,null,60,30]"#), "{warnings}");
     // The third file is not there at all.
     let vpc = root.join("list.vpc");
     fs::write(&vpc, list(&[item("a", 0), item("b", 30), item("far", 60)])).unwrap();
@@ -117,6 +125,9 @@ fn what_is_wrong_with_a_list_is_named_with_its_item() {
     };
     refused("{", &["list.vpc: is not a readable JSON list of point clouds"]);
     refused(&list(&[]), &["list.vpc: is a list that names no point cloud"]);
+    let mut number = item("north", 0);
+    number["assets"]["data"]["href"] = 5.into();
+    refused(&list(&[item("south", 0), number]), &["list.vpc: item 2 is not a readable item of STAC"]);
     let mut image = item("north", 0);
     image["assets"] = json!({"data": {"href": "north.tif", "roles": ["data"]}});
     refused(&list(&[image]), &["list.vpc: item \"north\": has no asset that is a point cloud"]);

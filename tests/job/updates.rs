@@ -157,14 +157,68 @@ fn results_that_were_changed_since_are_put_back() {
     let whole = fs::read(&tile).unwrap();
     fs::remove_file(&tile).unwrap();
     fs::write(&tile, "theirs").unwrap();
-    survey.update();
+    fs::remove_file(survey.job.out().join("report.json")).unwrap();
+    let said = survey.update();
+    assert_eq!(fs::read(&tile).unwrap(), whole);
+    for words in ["put back: report.json, tiles/000000.glb", "nothing else has changed since the last run"] {
+        assert!(said.err.contains(words), "{said:?}");
+    }
+    // Everything that a person sees.
+    let all = fs::read_dir(survey.job.out()).unwrap().map(|entry| entry.unwrap().path());
+    all.filter(|path| !path.ends_with("job")).for_each(|path| match path.is_dir() {
+        true => fs::remove_dir_all(&path).unwrap(),
+        false => fs::remove_file(&path).unwrap(),
+    });
+    let said = survey.update();
+    assert!(said.err.contains("put back: XXH128SUMS, ") && !said.err.contains("interrupted"), "{said:?}");
     assert_eq!(fs::read(&tile).unwrap(), whole);
     // The same file, under both of its names.
+    fs::write(&tile, "theirs").unwrap();
+    let said = survey.update();
+    assert_eq!(fs::read(&tile).unwrap(), whole);
+    for words in ["damaged since the last run, and computed again: tiles/000000.glb", "left of 1 part is damaged"] {
+        assert!(said.err.contains(words) && !said.err.contains("interrupted"), "{said:?}");
+    }
     fs::write(&tile, "theirs").unwrap();
     survey.write(15, 200);
     let said = survey.update();
     assert!(said.err.contains("damaged"), "{said:?}");
     survey.is_that_of_a_fresh_run();
+}
+
+#[test]
+fn results_of_which_no_copy_is_whole_are_computed_again() {
+    let mut survey = Survey::new("levels = false");
+    survey.update();
+    survey.write(15, 200);
+    survey.update();
+    let before = list(&survey.job.out());
+    let copies = [survey.job.out(), survey.job.out().join("job/results")];
+    let names = before.iter().map(|line| line.split_once("  ").unwrap().1).chain(["XXH128SUMS", "report.json"]);
+    names.for_each(|name| copies.iter().for_each(|folder| fs::write(folder.join(name), "damaged").unwrap()));
+    let said = survey.update();
+    assert!(said.err.contains("and put back: job/results/XXH128SUMS, XXH128SUMS\n"), "{said:?}");
+    assert_eq!(list(&survey.job.out()), before);
+    survey.job.verified();
+    let said = survey.update();
+    assert!(said.err.contains("nothing has changed since the last run"), "{said:?}");
+    // Journals that are cut off name fewer results than there are.
+    for part in 0..3 {
+        let journal = survey.job.out().join(format!("job/parts/{part}/journal"));
+        let text = fs::read(&journal).unwrap();
+        fs::write(&journal, &text[..text.len() / 2]).unwrap();
+    }
+    survey.update();
+    assert_eq!(list(&survey.job.out()), before);
+    survey.job.verified();
+    // What says how the plane is cut is gone, and so is the journal.
+    for name in ["first-plan.json", "journal"] {
+        fs::write(survey.job.out().join("job").join(name), "{}").unwrap();
+        survey.write(15, 200);
+        let said = survey.update();
+        assert!(said.err.contains(name.trim_end_matches(".json")) && said.err.contains("damaged"), "{said:?}");
+        survey.is_that_of_a_fresh_run();
+    }
 }
 
 #[test]

@@ -98,6 +98,11 @@ impl JobDirectory {
         self.job.join("update.json")
     }
 
+    /// Returns the path of the mark that all results of the last run with `--update` came into their places. It goes when a run begins.
+    pub(crate) fn placed_mark(&self) -> PathBuf {
+        self.job.join("placed")
+    }
+
     /// Returns the path of a result on its way from where it waits to its place, where it stays in both.
     pub(crate) fn on_the_way(&self) -> PathBuf {
         self.job.join("result")

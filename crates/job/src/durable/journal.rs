@@ -74,6 +74,11 @@ impl PublishedFile {
         self.is_at(&directory.results().directory().join(&self.name)).unwrap_or(false)
     }
 
+    /// Tells whether `content` is what was written.
+    pub(crate) fn holds(&self, content: &[u8]) -> bool {
+        (content.len() as u64, Checksum::of(content)) == (self.bytes, self.checksum)
+    }
+
     fn is_at(&self, path: &Path) -> Result<bool> {
         match Checksum::of_file(path) {
             Ok(found) => Ok(found == (self.bytes, self.checksum)),

@@ -59,12 +59,13 @@ impl KnownResults {
         self.names.contains(name)
     }
 
-    /// Checks that the result with this name, which `waits`, takes the `place` of nothing but a result. A run that was cut off may have put
-    /// the same file there.
+    /// Checks that the result with this name, which `waits`, takes the place of nothing but a result among `results`. A run that was cut off
+    /// may have put the same file there.
     ///
     /// # Errors
     /// [`Error::Config`] if a foreign file is there, [`Error::Io`] if it cannot be read.
-    pub(crate) fn check_place(&self, name: &Path, waits: &Path, place: &Path) -> Result<()> {
+    pub(crate) fn check_place(&self, name: &Path, waits: &Path, results: &OutputFiles) -> Result<()> {
+        let place = &results.directory().join(name);
         if self.contains(name) || !exists(place)? {
             return Ok(());
         }
@@ -72,8 +73,15 @@ impl KnownResults {
         if content(waits)? == content(place)? {
             return Ok(());
         }
-        let what =
-            "appeared during the job, and is not one of its results: move it away, and run the same command again";
-        Err(Error::Config(format!("{} {what}", place.display())))
+        let what = match self.has_list || !exists(&results.report())? {
+            true => "appeared during the job, and is not one of its results: move it away".to_string(),
+            false => format!(
+                "is in the place of a result, and {} is missing or damaged, which would tell whether a job wrote it: move everything in {} \
+                 but the folder job away",
+                results.checksums().display(),
+                results.directory().display()
+            ),
+        };
+        Err(Error::Config(format!("{} {what}, and run the same command again", place.display())))
     }
 }

@@ -64,13 +64,16 @@ pub fn check_results_are_ours(directory: &JobDirectory, page: bool) -> Result<()
         false => KnownResults::default(),
     };
     let Some(found) = first_unknown(directory, &known)? else { return Ok(()) };
-    let why = match is_finished && !known.has_list {
-        true => format!(" ({} is missing or damaged, which would list it)", results.checksums().display()),
-        false => String::new(),
+    let (why, what) = match is_finished && !known.has_list {
+        true => (
+            format!(" ({} is missing or damaged, which would list it)", results.checksums().display()),
+            format!("everything in {}", results.directory().display()),
+        ),
+        false => (String::new(), "it".to_string()),
     };
     Err(Error::Config(format!(
         "{} would be overwritten or removed, but is not known to be a result of an earlier job{why}: choose another [output] \
-         directory, or move it away",
+         directory, or move {what} away",
         found.display()
     )))
 }

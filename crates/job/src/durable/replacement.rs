@@ -63,7 +63,7 @@ impl Replacement {
         for name in names.iter().collect::<BTreeSet<_>>() {
             let [place, waits] = [results, waiting].map(|folder| folder.directory().join(name));
             if exists(&waits)? {
-                known.check_place(name, &waits, &place)?;
+                known.check_place(name, &waits, results)?;
                 if on_the_way.is_none() || !is_in_place(&waits, &place)? {
                     found.push((waits, place));
                 }

@@ -1,13 +1,12 @@
 //! What identifies an input: whether a file is the one that an earlier run read, whatever it is called by now.
 
-use points::is_url;
 use points::samples::FileSamples;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-use sys::{Error, Result};
+use sys::Result;
 
 /// The inputs of a job in their order.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -40,7 +39,7 @@ struct InputIdentity {
 struct ContentIdentity {
     #[serde(flatten)]
     samples: FileSamples,
-    /// When it was written, in whole seconds since 1970, because file systems keep different fractions.
+    /// When it was written, in milliseconds since 1970; 0 for a file of another machine.
     modified: u64,
 }
 
@@ -139,10 +138,11 @@ impl InputIdentities {
         modified.map(|(now, _)| now.path.display().to_string()).collect()
     }
 
-    /// Returns the paths of those files that have another time than when they were `planned`, with the same contents in the same order.
+    /// Returns the paths of those files that have another time, in whole seconds, than when they were `planned`, with the same contents in the
+    /// same order.
     pub(crate) fn with_other_times(&self, planned: &InputIdentities) -> Vec<String> {
         let pairs = self.0.iter().zip(&planned.0);
-        let others = pairs.filter(|(now, planned)| now.content.modified != planned.content.modified);
+        let others = pairs.filter(|(now, planned)| now.content.second() != planned.content.second());
         others.map(|(now, _)| now.path.display().to_string()).collect()
     }
 
@@ -203,12 +203,13 @@ impl RenamedInputs {
 
 impl ContentIdentity {
     fn of(path: &Path) -> Result<ContentIdentity> {
-        let samples = FileSamples::of(path)?;
-        if path.to_str().is_some_and(is_url) {
-            return Ok(ContentIdentity { samples, modified: 0 });
-        }
-        let data = path.metadata().map_err(Error::io("read", path))?;
-        Ok(ContentIdentity { samples, modified: data.modified().map_or(0, seconds) })
+        let (samples, modified) = FileSamples::with_time(path)?;
+        Ok(ContentIdentity { samples, modified })
+    }
+
+    /// Returns when it was written, in whole seconds since 1970: other machines may see other fractions.
+    fn second(self) -> u64 {
+        self.modified / 1_000
     }
 
     /// Tells whether the file, which is at `path` now, seems to have been modified since a job was `begun` with this content. Only a time after
@@ -216,7 +217,7 @@ impl ContentIdentity {
     fn is_modified(&self, path: &Path, begun: SystemTime) -> bool {
         let Some(now) = path.metadata().ok().and_then(|data| data.modified().ok()) else { return false };
         // With a clock that is ahead, a file has its time from the future at both times.
-        let is_other = seconds(now) != self.modified || now.duration_since(begun).is_ok_and(|age| age.as_secs() == 0);
+        let is_other = seconds(now) != self.second() || now.duration_since(begun).is_ok_and(|age| age.as_secs() == 0);
         now > begun && is_other
     }
 }

@@ -88,6 +88,7 @@ impl NamedInputs {
         on_bad_file: OnBadFile,
     ) -> Result<Vec<PathBuf>> {
         let all = list.clouds.len();
+        self.notes.extend(areas.unusable_boxes(list));
         let (wanted, outside) = areas.wanted(std::mem::take(&mut list.clouds));
         if outside > 0 {
             self.notes.push(format!(

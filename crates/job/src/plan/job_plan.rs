@@ -248,9 +248,17 @@ impl Plan {
     /// [`Error::Io`] if the file cannot be read, [`Error::Broken`] if it holds no plan.
     pub fn read(path: &Path) -> Result<Plan> {
         let text = std::fs::read(path).map_err(Error::io("read", path))?;
-        let plan: Plan =
-            serde_json::from_slice(&text).map_err(|e| Error::Broken(format!("{}: {e}", path.display())))?;
-        Ok(plan.with_area_in_rules())
+        let parsed = std::str::from_utf8(&text).map_err(|e| e.to_string());
+        let parsed = parsed.and_then(|text| Plan::parse(text).map_err(|e| e.to_string()));
+        parsed.map_err(|e| Error::Broken(format!("{}: {e}", path.display())))
+    }
+
+    /// Reads the text of a plan.
+    ///
+    /// # Errors
+    /// What is wrong with the text.
+    pub(crate) fn parse(text: &str) -> serde_json::Result<Plan> {
+        serde_json::from_str(text).map(Plan::with_area_in_rules)
     }
 
     /// Gives the rules of all inputs the area that points are kept in, which is written once for all of them.

@@ -66,6 +66,20 @@ impl ListedAreas {
         (wanted, outside)
     }
 
+    /// Says that items of a list do not tell where they lie, where that matters: `None` if all others do.
+    pub(crate) fn unusable_boxes(&self, list: &ListedInputs) -> Option<String> {
+        let unusable: Vec<&String> = list.clouds.iter().filter_map(|cloud| cloud.unusable_box.as_ref()).collect();
+        let first = unusable.first().filter(|_| !self.areas.is_empty())?;
+        let others = match unusable.len() - 1 {
+            0 => String::new(),
+            others => format!(", and {others} more have no usable box either"),
+        };
+        Some(format!(
+            "{}: {first}, which is unusable{others}: their files are opened, wherever they lie; fix: correct the list",
+            list.list.display()
+        ))
+    }
+
     fn are_apart(&self, claim: &ListedBox) -> bool {
         let is_same_system = |area: &WantedArea| match (&area.crs, self.systems.get(&claim.crs)) {
             (None, _) => self.systems.len() == 1,
@@ -124,7 +138,7 @@ mod tests {
     }
 
     fn cloud(name: &str, crs: &str, bounds: [f64; 4]) -> ListedCloud {
-        ListedCloud { path: name.into(), claim: Some(ListedBox { crs: crs.into(), bounds }) }
+        ListedCloud { path: name.into(), claim: Some(ListedBox { crs: crs.into(), bounds }), unusable_box: None }
     }
 
     /// Returns the clouds of a list that a job with these options opens.
@@ -141,7 +155,7 @@ mod tests {
             cloud("near", "EPSG:25832", [0.0, 0.0, 100.0, 100.0]),
             cloud("touches", "EPSG:25832", [211.0, 0.0, 300.0, 100.0]),
             cloud("far", "EPSG:25832", [212.0, 0.0, 300.0, 100.0]),
-            ListedCloud { path: "unknown".into(), claim: None },
+            ListedCloud { path: "unknown".into(), claim: None, unusable_box: None },
         ];
         let bounds = "bounds = [50.0, 50.0, 210.0, 60.0]\n";
         let all = ["near", "touches", "far", "unknown"];
@@ -161,6 +175,27 @@ mod tests {
         let mut mixed = clouds.to_vec();
         mixed.push(cloud("other", "EPSG:25833", [0.0, 0.0, 100.0, 100.0]));
         assert_eq!(opened(&options(bounds), &mixed).len(), 5, "which of two systems the bounds are in, no list says");
+    }
+
+    #[test]
+    fn boxes_that_cannot_be_used_are_told_where_they_matter() {
+        let unusable = |name: &str| {
+            let what = Some(format!("item {name:?} (number 1) has proj:bbox []"));
+            ListedCloud { path: name.into(), claim: None, unusable_box: what }
+        };
+        let told = |line: &str, clouds: Vec<ListedCloud>| {
+            let lists = [ListedInputs { list: "a.vpc".into(), clouds }];
+            ListedAreas::of(&options(line), &lists).unusable_boxes(&lists[0])
+        };
+        let bounds = "bounds = [50.0, 50.0, 210.0, 60.0]";
+        let one = told(bounds, vec![unusable("a")]).unwrap();
+        assert!(
+            one.starts_with("a.vpc: item \"a\" (number 1) has proj:bbox [], which is unusable: their files"),
+            "{one}"
+        );
+        assert!(told(bounds, vec![unusable("a"), unusable("b")]).unwrap().contains("and 1 more"));
+        assert_eq!(told("", vec![unusable("a")]), None);
+        assert_eq!(told(bounds, vec![cloud("near", "EPSG:25832", [0.0, 0.0, 100.0, 100.0])]), None);
     }
 
     #[test]

@@ -31,8 +31,9 @@ use crate::run::part_entries::PartJournals;
 use crate::run::phases::do_phases;
 use crate::run::phases::plan_phase::note_skipped;
 use crate::run::phases::stage_costs::stage_costs;
-use crate::run::update::changes::end_without_changes;
+use crate::run::update::changes::{end_without_changes, mark_placed};
 use crate::run::update::first_plan_file::has_first_plan;
+use crate::run::update::mending::Mended;
 use crate::run::whole_run::WholeRun;
 use crate::tiles::vertex_colors::check_photo;
 use crate::{Error, Result};
@@ -78,7 +79,10 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
         // Before anything else can fail: an earlier run may have been cut off while its results took their places.
         lock = Some(directory.lock()?);
         earlier = read_earlier(&directory, run)?;
-        if let (None, false) = (&earlier, run.restart)
+        if earlier.is_none() && options.updates && has_first_plan(&directory)? {
+            let path = directory.journal();
+            run.progress.note(&format!("{} is missing: everything is computed again", path.display()));
+        } else if let (None, false) = (&earlier, run.restart)
             && let InPlace::ThisJob(report) = results_in_place(&directory, options, run.submission, || Ok(false))?
         {
             run.progress.note("the interrupted run had put all its results in place");
@@ -131,7 +135,10 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
                 // The work of many machines is not done again by one.
                 return Err(damaged_by_tasks(&job.directory));
             }
-            run.progress.note("what the interrupted run left is damaged; starting over");
+            run.progress.note(match options.updates {
+                true => "what the last run left is damaged; everything is computed again",
+                false => "what the interrupted run left is damaged; starting over",
+            });
             continue;
         }
         // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
@@ -159,7 +166,7 @@ pub(crate) fn may_coarsen(options: &JobOptions, vertical: bool) -> bool {
 pub(crate) fn read_earlier(directory: &JobDirectory, run: RunOptions) -> sys::Result<Option<EarlierRun>> {
     let mut earlier = EarlierRun::read(directory)?;
     if let Some(earlier) = earlier.as_mut() {
-        earlier.place_whole_results(directory)?;
+        earlier.place_whole_results(directory, run.progress)?;
         if run.restart || earlier.submission < run.submission {
             earlier.forget();
         } else if !earlier.is_readable() {
@@ -184,7 +191,7 @@ fn attempt(
     let (mut plan, is_update) = match known {
         Some(plan) => (plan, false),
         None => {
-            let first = earlier.as_ref().and_then(|earlier| earlier.first_plan(directory, &header));
+            let first = earlier.as_ref().and_then(|earlier| earlier.first_plan(directory, &header, run.progress));
             on_threads(workers(options, 0)?, || planned(job, coarsening, first.as_ref()))?
         }
     };
@@ -226,11 +233,15 @@ fn attempt(
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
         if options.updates {
-            if end_without_changes(directory)? {
+            let mended = earlier.as_ref().map(EarlierRun::mended);
+            if end_without_changes(directory)? || mended.is_some_and(|mended| mended.is_interrupted) {
                 progress.note("the interrupted run had written all its results");
                 return Ok(report);
             }
-            progress.note("nothing has changed since the last run");
+            progress.note(match mended.is_some_and(Mended::has_put_back) {
+                true => "nothing else has changed since the last run",
+                false => "nothing has changed since the last run",
+            });
             return Ok(Report { update: Some(ChangeCounts::default()), ..report });
         }
         progress.note("the last run had written all its results");
@@ -321,6 +332,7 @@ impl EndedRun<'_> {
             Ok(report) if updates && has_first_plan(directory)? => {
                 let results = directory.waiting_results();
                 directory.keep_results(&results.iter().map(|path| directory.name(path)).collect())?;
+                mark_placed(directory)?;
                 Ok(report)
             }
             Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),

@@ -21,6 +21,7 @@ use crate::run::phases::meshed_part::MeshedPart;
 use crate::run::single_process;
 use crate::run::update::changes::place_changes;
 use crate::run::update::first_plan_file::first_plan;
+use crate::run::update::mending::Mended;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::io::{self, ErrorKind};
@@ -41,6 +42,10 @@ pub(crate) struct EarlierRun {
     pub(crate) submission: u64,
     /// Whether all its results are in place.
     is_complete: bool,
+    /// Whether it had `--update`, and wrote all its results.
+    is_finished: bool,
+    /// What became of its results since, if it is finished.
+    mended: Mended,
     /// Whether phases of parts were dropped, so that their journals must be written again.
     has_dropped: bool,
 }
@@ -58,39 +63,73 @@ impl EarlierRun {
             Some(header) => PartJournals::of(directory, header.id)?,
             None => PartJournals::default(),
         };
-        Ok(Some(EarlierRun { submission, header, entries, parts, is_complete: false, has_dropped: false }))
+        let (is_finished, mended) = (false, Mended::default());
+        let run = EarlierRun {
+            submission,
+            header,
+            entries,
+            parts,
+            is_complete: false,
+            is_finished,
+            mended,
+            has_dropped: false,
+        };
+        Ok(Some(run))
     }
 
     /// Puts the results in place if the run had written them all. From then on they are what the output directory holds, whatever
-    /// this run does.
+    /// this run does. Those of an update are mended before that.
     ///
     /// # Errors
     /// As [`JobDirectory::replace_results`].
-    pub(crate) fn place_whole_results(&mut self, directory: &JobDirectory) -> Result<()> {
+    pub(crate) fn place_whole_results(&mut self, directory: &JobDirectory, progress: ProgressOutput) -> Result<()> {
+        let has_report = self.entries.iter().any(|entry| entry.step == JobStep::Report);
+        let updates = self.header.as_ref().is_some_and(|header| header.fingerprint.updates());
+        if has_report && updates {
+            self.is_finished = true;
+            self.mended = Mended::of(directory, self.results(directory).cloned().collect())?;
+            self.mended.tell(progress);
+        }
         let is_whole = |file: &PublishedFile| {
             interrupt::check()?;
             Ok(file.is_whole(directory) || file.is_in_place(directory))
         };
-        let has_report = self.entries.iter().any(|entry| entry.step == JobStep::Report);
         let names = self.results(directory).map(|file| file.name.clone()).collect();
-        // The report takes its place last. After that the journals go.
+        // The report takes its place last. After that the journals go, but not those of an update: if they name fewer results than the list,
+        // they are damaged, and what they do not name must stay.
         let report = directory.name(&directory.results().report());
-        let is_last = |file: &PublishedFile| file.name == report && file.is_in_place(directory);
+        let is_last = |file: &PublishedFile| !updates && file.name == report && file.is_in_place(directory);
         let are_all = has_report && (self.results(directory).any(is_last) || are_all_results(directory, &names)?);
         if !are_all || !self.results(directory).try_fold(true, |all, file| Ok(all && is_whole(file)?))? {
             return Ok(());
         }
         self.is_complete = true;
-        directory.replace_results(&names, self.header.as_ref().is_some_and(|header| header.fingerprint.updates()))?;
+        directory.replace_results(&names, updates)?;
         place_changes(directory)
     }
 
     /// Returns the plan of the first run, if the job with `header` is an update of this one: both have `--update`, and their meshes depend on the
     /// same options.
-    pub(crate) fn first_plan(&self, directory: &JobDirectory, header: &JobHeader) -> Option<Plan> {
+    pub(crate) fn first_plan(
+        &self,
+        directory: &JobDirectory,
+        header: &JobHeader,
+        progress: ProgressOutput,
+    ) -> Option<Plan> {
         let old = self.header.as_ref().filter(|old| old.coarsening == header.coarsening)?;
         let is_update = header.fingerprint.updates() && header.fingerprint.may_update(&old.fingerprint);
-        is_update.then(|| first_plan(directory)).flatten()
+        let first = is_update.then(|| first_plan(directory)).flatten();
+        // A job of a single part, whose nodes above it have a journal too, is computed as a whole in any case.
+        if is_update && self.is_finished && first.is_none() && self.parts.0.len() > 2 {
+            let path = directory.first_plan();
+            progress.note(&format!("{} is missing or damaged: everything is computed again", path.display()));
+        }
+        first
+    }
+
+    /// Returns what became of its results since, if it had `--update` and wrote them all.
+    pub(crate) fn mended(&self) -> &Mended {
+        &self.mended
     }
 
     fn results<'a>(&'a self, directory: &'a JobDirectory) -> impl Iterator<Item = &'a PublishedFile> {
@@ -140,6 +179,7 @@ impl EarlierRun {
         self.entries.clear();
         self.parts.0.clear();
         self.is_complete = false;
+        self.is_finished = false;
     }
 
     /// Returns how much coarser the lattice became, if the job with this fingerprint has the same mesh.
@@ -155,7 +195,8 @@ impl EarlierRun {
     pub(crate) fn plan(&self, directory: &JobDirectory, header: &JobHeader, options: &JobOptions) -> Option<Plan> {
         let (old, entry) = (self.header.as_ref()?, self.entries.iter().find(|entry| entry.step == JobStep::Plan)?);
         let change = header.fingerprint.since(&old.fingerprint);
-        if self.is_complete && header.fingerprint.updates() && change != JobChange::Nothing {
+        let is_as_it_was = change == JobChange::Nothing && self.is_complete;
+        if self.is_finished && header.fingerprint.updates() && !is_as_it_was {
             // It is updated, which takes a plan of its own.
             return None;
         }

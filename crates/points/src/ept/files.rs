@@ -81,6 +81,9 @@ impl SideFile {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(refused(error)),
         };
+        if file.metadata().is_ok_and(|data| data.is_dir()) {
+            return Err(Error::input(&self.path, "is a folder, not a file: copy the data set again"));
+        }
         let mut bytes = Vec::new();
         file.take(LARGEST + 1).read_to_end(&mut bytes).map_err(refused)?;
         match bytes.len() as u64 > LARGEST {

@@ -1,10 +1,11 @@
 //! The hierarchy of an EPT: which nodes there are, and how many points each has. It is read page by page, as far as bounds need it.
 
-use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::ept::files::page;
 use crate::ept::key::NodeKey;
@@ -81,7 +82,7 @@ impl Hierarchy {
 fn entries(index: &Path, root: NodeKey) -> Result<Vec<(NodeKey, i64)>> {
     let refused = |what: String| Error::input(name_beside(index, &page_name(root)), what);
     let bytes = page(index, root)?;
-    let entries: BTreeMap<String, i64> = serde_json::from_slice(bytes.as_ref())
+    let Entries(entries) = serde_json::from_slice(bytes.as_ref())
         .map_err(|error| refused(format!("is not a readable page of the hierarchy: {error}")))?;
     let entry = |(text, points): (String, i64)| {
         let key = NodeKey::parse(&text).filter(|key| key.is_within(root));
@@ -90,7 +91,39 @@ fn entries(index: &Path, root: NodeKey) -> Result<Vec<(NodeKey, i64)>> {
         let is_number = points >= 0 || points == PAGE && key != root;
         is_number.then_some((key, points)).ok_or_else(|| refused(format!("has {points} as the points of node {key}")))
     };
-    entries.into_iter().map(entry).collect()
+    let mut entries = entries.into_iter().map(entry).collect::<Result<Vec<_>>>()?;
+    entries.sort_unstable();
+    match entries.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        Some(pair) => Err(refused(format!("has the node {} twice: build or copy the data set again", pair[0].0))),
+        None => Ok(entries),
+    }
+}
+
+/// The members of an object, also those of one name.
+struct Entries(Vec<(String, i64)>);
+
+impl<'de> Deserialize<'de> for Entries {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Entries, D::Error> {
+        deserializer.deserialize_map(EntriesVisitor)
+    }
+}
+
+struct EntriesVisitor;
+
+impl<'de> Visitor<'de> for EntriesVisitor {
+    type Value = Entries;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("an object of nodes and their points")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> std::result::Result<Entries, A::Error> {
+        let mut entries = Vec::new();
+        while let Some(entry) = map.next_entry()? {
+            entries.push(entry);
+        }
+        Ok(Entries(entries))
+    }
 }
 
 #[cfg(test)]
@@ -133,7 +166,9 @@ mod tests {
             (&[("0-0-0-0", r#"{"0-0-0-0": -2}"#)], "has -2 as the points"),
             (&[("0-0-0-0", r#"{"1-2-0-0": 2}"#)], "has the node \"1-2-0-0\", which does not belong"),
             (&[PAGES[0], ("1-1-0-0", r#"{"1-0-0-0": 7}"#)], "1-1-0-0.json: has the node \"1-0-0-0\""),
-            (&[PAGES[0], ("1-1-0-0", r#"{"1-1-0-0": 7, "01-1-0-0": 7}"#)], "has the node 1-1-0-0 twice"),
+            (&[PAGES[0], ("1-1-0-0", r#"{"1-1-0-0": 7, "01-1-0-0": 7}"#)], "1-1-0-0.json: has the node 1-1-0-0 twice"),
+            (&[("0-0-0-0", r#"{"0-0-0-0": 7, "1-0-0-0": 1, "0-0-0-0": 8}"#)], "has the node 0-0-0-0 twice"),
+            (&[("0-0-0-0", "[5]")], "expected an object of nodes"),
         ] {
             let error = read(pages, |_| true).unwrap_err();
             assert!(error.kind() == ErrorKind::Input && error.to_string().contains(words), "{words}: {error}");

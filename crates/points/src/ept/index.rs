@@ -1,5 +1,6 @@
 //! The index of an EPT: the file `ept.json`.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -31,6 +32,8 @@ struct IndexFile {
     schema: Vec<Dimension>,
     #[serde(default)]
     srs: Option<SystemOfIndex>,
+    #[serde(default)]
+    version: Value,
 }
 
 /// The coordinate reference system. A data set without one has an empty object.
@@ -59,8 +62,8 @@ pub(crate) enum DataType {
 pub(crate) struct EptIndex {
     pub(crate) data_type: DataType,
     pub(crate) points: u64,
-    /// The cube of the octree: least x and y, and its sides.
-    pub(crate) cube: ([f64; 2], [f64; 2]),
+    /// The cube of the octree: least x, y, z, and its sides.
+    pub(crate) cube: ([f64; 3], [f64; 3]),
     /// Least and greatest x, y, z of the points.
     pub(crate) bounds: [[f64; 3]; 2],
     pub(crate) axes: [Axis; 3],
@@ -79,6 +82,12 @@ impl EptIndex {
         let refused = |what: String| Error::input(path, what);
         let file: IndexFile =
             serde_json::from_slice(text).map_err(|error| refused(format!("is not a readable EPT index: {error}")))?;
+        if !is_known_version(&file.version) {
+            return Err(refused(format!(
+                "has the version {} of EPT: only versions 1.0 to 1.x are supported",
+                file.version
+            )));
+        }
         let data_type = match file.data_type.as_str() {
             "laszip" => DataType::Laszip,
             "binary" => DataType::Binary,
@@ -98,24 +107,61 @@ impl EptIndex {
         }
         let axes = [0, 1, 2].map(|axis| axis_in(&file.schema, axis).map_err(refused));
         let [x, y, z] = axes;
-        let [xmin, ymin, _, xmax, ymax, _] = file.bounds;
-        let side = [xmax - xmin, ymax - ymin];
+        let mut names = HashSet::new();
+        if let Some(twice) = file.schema.iter().find(|dimension| !names.insert(&dimension.name)) {
+            return Err(refused(format!("has the dimension {} twice in its schema", twice.name)));
+        }
+        let [min, max] = corners(file.bounds);
+        let side = [0, 1, 2].map(|axis| max[axis] - min[axis]);
         if side.iter().any(|side| !(side.is_finite() && *side > 0.0)) {
             return Err(refused(format!("has bounds that are not a cube: {:?}", file.bounds)));
         }
-        let bounds = file.bounds_conforming.unwrap_or(file.bounds);
+        let bounds = match file.bounds_conforming.map(corners) {
+            Some(conforming) if are_within(conforming, [min, max]) => conforming,
+            Some(conforming) => {
+                warnings.push(format!(
+                    "has boundsConforming {conforming:?}, which are not within its bounds {:?} and are ignored",
+                    [min, max]
+                ));
+                [min, max]
+            }
+            None => [min, max],
+        };
         let has = |name: &str| file.schema.iter().any(|dimension| dimension.name == name);
         Ok(EptIndex {
             data_type,
             points: file.points,
-            cube: ([xmin, ymin], side),
-            bounds: [[bounds[0], bounds[1], bounds[2]], [bounds[3], bounds[4], bounds[5]]],
+            cube: (min, side),
+            bounds,
             axes: [x?, y?, z?],
             has_rgb: ["Red", "Green", "Blue"].into_iter().all(has),
             layout: BinaryLayout::of(&file.schema).map_err(refused)?,
             crs: file.srs.map_or(Ok(Crs::default()), |srs| srs.system(warnings))?,
         })
     }
+}
+
+/// Returns the least and the greatest corner of a box, which are written one after the other.
+fn corners([xmin, ymin, zmin, xmax, ymax, zmax]: [f64; 6]) -> [[f64; 3]; 2] {
+    [[xmin, ymin, zmin], [xmax, ymax, zmax]]
+}
+
+/// Tells whether a box lies within the cube, or reaches beyond it by less than a thousandth of its side, as rounding may do.
+fn are_within([least, greatest]: [[f64; 3]; 2], [min, max]: [[f64; 3]; 2]) -> bool {
+    (0..3).all(|axis| {
+        let slack = (max[axis] - min[axis]) / 1024.0;
+        least[axis] >= min[axis] - slack && greatest[axis] <= max[axis] + slack && least[axis] <= greatest[axis]
+    })
+}
+
+/// Tells whether an index of this version can be read. Some writers leave it out.
+fn is_known_version(version: &Value) -> bool {
+    let text = match version {
+        Value::Null => return true,
+        Value::String(text) => text.trim().to_string(),
+        other => other.to_string(),
+    };
+    text == "1" || text.starts_with("1.")
 }
 
 /// Returns what the integers of an axis mean. Without a scale they are whole units.

@@ -10,9 +10,8 @@ use crate::ept::binary::{BinaryLayout, decompressed};
 use crate::ept::files::{LARGEST, SideFile};
 use crate::ept::hierarchy::{Hierarchy, Node};
 use crate::ept::index::{DataType, EptIndex};
-use crate::ept::key::NodeKey;
 use crate::ept::name::node_name;
-use crate::ept::node_sink::NodeSink;
+use crate::ept::node_sink::{NodeCell, NodeSink};
 use crate::file::random_access::RandomAccessFile;
 use crate::las::header::LasHeader;
 use crate::las::laz::CompressedPoints;
@@ -20,7 +19,6 @@ use crate::las::vlr;
 use crate::point_format::PointFormat;
 use crate::points::axis::Axis;
 use crate::points::chunk_request::ChunkRequest;
-use crate::points::octree::cell_of;
 use crate::points::raw_bounds::RawBounds;
 use crate::points::record_sink::RecordSink;
 use sys::{Error, Result, Warnings};
@@ -49,9 +47,9 @@ pub(crate) struct EptPoints {
     data: NodeData,
     /// Those of all nodes.
     axes: [Axis; 3],
-    /// The least x and y of the octree's cube, in raw steps, and its sides.
-    min: [f64; 2],
-    side: [f64; 2],
+    /// The least x, y, z of the octree's cube, in raw steps, and its sides.
+    min: [f64; 3],
+    side: [f64; 3],
     /// The nodes that bounds may want, in the order of their records.
     nodes: Vec<Node>,
     /// The end of each chunk among the nodes, and the number of the first record behind it.
@@ -71,7 +69,9 @@ struct NodeRequest<'a> {
     file: SideFile,
     /// The number of its first record in the data set.
     first: u64,
-    cell: Option<RawBounds>,
+    /// Where its points lie by the octree, if they are compared with it.
+    cell: Option<NodeCell>,
+    axes: &'a [Axis; 3],
     request: ChunkRequest<'a>,
 }
 
@@ -85,14 +85,13 @@ impl EptPoints {
         let float = |number: rust_decimal::Decimal| number.to_f64().unwrap_or(f64::NAN);
         let (corner, side) = index.cube;
         let (offset, scale) = (index.axes.map(|axis| float(axis.offset)), index.axes.map(|axis| float(axis.scale)));
-        let min = [0, 1].map(|axis| (corner[axis] - offset[axis]) / scale[axis]);
-        let side = [0, 1].map(|axis| side[axis] / scale[axis]);
+        let min = [0, 1, 2].map(|axis| (corner[axis] - offset[axis]) / scale[axis]);
+        let side = [0, 1, 2].map(|axis| side[axis] / scale[axis]);
         if min.iter().chain(&side).any(|number| !number.is_finite()) {
             return Err(Error::input(path, "has bounds that are no numbers in steps of its scale"));
         }
         let bounds = bounds.filter(|_| uses_index).map(|bounds| RawBounds::of(&index.axes, bounds));
-        let cell = |NodeKey(level, [x, y, _]): NodeKey| cell_of(min, side, level, [x, y]);
-        let is_wanted = |key: NodeKey| bounds.as_ref().is_none_or(|bounds| cell(key).meet(bounds));
+        let is_wanted = |key| bounds.as_ref().is_none_or(|bounds| NodeCell::of(min, side, key).plane.meet(bounds));
         let hierarchy = Hierarchy::read(path, is_wanted)?;
         let promised = index.points;
         if hierarchy.points > promised {
@@ -135,14 +134,13 @@ impl EptPoints {
         self.ends.get(chunk).map_or(&[], |(end, _)| &self.nodes[start..*end])
     }
 
-    /// Returns what the points of a node lie within, if bounds make it matter.
-    fn cell(&self, node: &Node, bounds: Option<&RawBounds>) -> Option<RawBounds> {
-        let NodeKey(level, [x, y, _]) = node.key;
-        bounds.filter(|_| self.uses_index).map(|_| cell_of(self.min, self.side, level, [x, y]))
+    /// Returns what the points of a node lie within.
+    fn cell(&self, node: &Node) -> NodeCell {
+        NodeCell::of(self.min, self.side, node.key)
     }
 
     fn may_reach(&self, node: &Node, bounds: Option<&RawBounds>) -> bool {
-        self.cell(node, bounds).zip(bounds).is_none_or(|(cell, bounds)| cell.meet(bounds))
+        bounds.filter(|_| self.uses_index).is_none_or(|bounds| self.cell(node).plane.meet(bounds))
     }
 
     fn is_decoded(&self, node: &Node, request: &ChunkRequest) -> bool {
@@ -219,11 +217,12 @@ impl PointFormat for EptPoints {
                 node: *node,
                 file: self.side_file(index, node)?,
                 first: number,
-                cell: self.cell(node, request.bounds).filter(|_| !request.left_out),
+                cell: (!request.left_out).then(|| self.cell(node)),
+                axes: &self.axes,
                 request: ChunkRequest { records, bounds: None, left_out: false, ..request },
             };
             match &self.data {
-                NodeData::Laszip => wanted.decode_laszip(&self.axes, sink)?,
+                NodeData::Laszip => wanted.decode_laszip(sink)?,
                 NodeData::Binary(layout) => wanted.decode_records(layout, false, sink)?,
                 NodeData::Zstandard(layout) => wanted.decode_records(layout, true, sink)?,
             }
@@ -243,7 +242,8 @@ impl PointFormat for EptPoints {
 
 impl NodeRequest<'_> {
     fn sink<'a, S: RecordSink>(&'a self, inner: &'a mut S) -> NodeSink<'a, S> {
-        NodeSink { index: self.index, file: &self.file.path, first: self.first, cell: self.cell, inner }
+        let NodeRequest { index, ref file, first, cell, axes, .. } = *self;
+        NodeSink { index, file: &file.path, first, cell, axes, inner }
     }
 
     /// Counts all wanted records as lost.
@@ -260,7 +260,7 @@ impl NodeRequest<'_> {
     }
 
     /// Decodes a node that is a LAZ file.
-    fn decode_laszip(&self, axes: &[Axis; 3], sink: &mut impl RecordSink) -> Result<()> {
+    fn decode_laszip(&self, sink: &mut impl RecordSink) -> Result<()> {
         let Some(file) = self.file.open()? else {
             self.is_missing(sink);
             return Ok(());
@@ -272,7 +272,7 @@ impl NodeRequest<'_> {
             }
             read => read?,
         };
-        if header.axes != *axes {
+        if header.axes != *self.axes {
             return Err(self.refused("this node has another scale or offset than the index"));
         }
         if header.records != self.node.points {

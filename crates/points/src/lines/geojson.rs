@@ -175,7 +175,8 @@ fn refuse_metres(path: &Path, purpose: LinePurpose, collector: &FeatureCollector
                         .into()
                 }
                 LinePurpose::Clip | LinePurpose::Places => {
-                    format!("and the file has no CRS: {}", purpose.remedy_of_crs(path))
+                    let [of_crs, of_local] = [purpose.remedy_of_crs(path), purpose.remedy_of_local(path)];
+                    format!("and the file has no CRS: {of_crs}; if they are those of points without a CRS, {of_local}")
                 }
             };
             Err(collector.refuse(

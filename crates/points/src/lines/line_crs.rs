@@ -185,7 +185,15 @@ fn other_system(file: &LineFile, own: &Crs, points: &Crs, why: &str) -> Error {
         Some(code) => format!("for example with `ogr2ogr -t_srs EPSG:{code} {features}.gpkg {path}`"),
         None => "for example in QGIS".into(),
     };
-    let points = if points.is_named() { points.label() } else { "a plane without a CRS".into() };
+    if !points.is_named() {
+        return Error::Config(format!(
+            "{path} is in {}, but the points are in a plane without a CRS: {why}. Set [input] crs of the job to theirs; if the {features} have \
+             the coordinates of the points, {}",
+            own.label(),
+            file.purpose.remedy_of_local(&file.path)
+        ));
+    }
+    let points = points.label();
     let remedy = match file.purpose {
         LinePurpose::Breaklines => {
             "set crs in [[breaklines]], such as crs = \"points\" for the CRS of the points".into()
@@ -326,6 +334,7 @@ mod tests {
             let error = bring(own, "auto", points).unwrap_err();
             assert_eq!(error.kind(), ErrorKind::Usage);
             assert!(error.to_string().contains(word) && error.to_string().contains("crs = \"points\""), "{error}");
+            assert_eq!(error.to_string().contains("Set [input] crs"), !points.is_named(), "{error}");
         }
         let beyond = bring_vertex([87.0, 0.0, 1.0], &degrees, "auto", &zone_15).unwrap_err();
         assert!(beyond.kind() == ErrorKind::Input && beyond.to_string().contains("feature 1"), "{beyond}");

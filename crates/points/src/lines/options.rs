@@ -84,6 +84,18 @@ impl LinePurpose {
         }
     }
 
+    /// Returns what to do about the file at `path` if it has the coordinates of points without a CRS.
+    pub fn remedy_of_local(self, path: &Path) -> String {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        match (self, ending.as_deref()) {
+            (LinePurpose::Breaklines, _) => "set crs = \"points\" in [[breaklines]]".into(),
+            (_, Some("gpkg" | "shp")) => {
+                format!("write it without a CRS, for example with `ogr2ogr -a_srs none local.gpkg {}`", path.display())
+            }
+            _ => "write the member \"crs\": null into it".into(),
+        }
+    }
+
     /// Returns what to do about the file at `path` if it states no CRS that can be used.
     pub fn remedy_of_crs(self, path: &Path) -> String {
         match self {

@@ -14,6 +14,8 @@ pub struct ListedCloud {
     pub path: PathBuf,
     /// Where it lies, if the list says that.
     pub claim: Option<ListedBox>,
+    /// Names the item, and what the list says in the place of a box that can be used.
+    pub unusable_box: Option<String>,
 }
 
 /// Where a point cloud lies, as a list says.

@@ -2,14 +2,14 @@
 //! of items, and links to further documents.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use serde::Deserialize;
+use serde_json::Value;
+use serde_json::value::RawValue;
 
 use crate::ept::name::EPT;
 use crate::lists::listed_cloud::{ListedBox, ListedCloud, is_cloud, name_in, place_of};
@@ -23,6 +23,12 @@ const MOST: u64 = 1 << 28;
 /// About as many bytes has a document.
 const ABOUT: u64 = 1 << 16;
 
+/// Numbers that JSON does not have, but some programs write.
+const NO_JSON: [&str; 3] = ["NaN", "-Infinity", "Infinity"];
+
+/// The most characters of a value that a message shows.
+const MOST_SHOWN: usize = 80;
+
 /// The most documents of a list, and the most links from the first to the last of them.
 const MOST_DOCUMENTS: usize = 1_000_000;
 const DEEPEST: usize = 32;
@@ -33,9 +39,10 @@ struct Document {
     #[serde(rename = "type", default)]
     kind: String,
     #[serde(default)]
-    id: Option<String>,
+    id: Value,
+    /// Each is parsed alone, so that messages name it.
     #[serde(default)]
-    features: Vec<Item>,
+    features: Vec<Box<RawValue>>,
     #[serde(default)]
     properties: Option<Properties>,
     #[serde(default)]
@@ -50,7 +57,7 @@ struct Document {
 #[derive(Deserialize)]
 struct Item {
     #[serde(default)]
-    id: Option<String>,
+    id: Value,
     #[serde(default)]
     properties: Option<Properties>,
     #[serde(default)]
@@ -60,13 +67,13 @@ struct Item {
 #[derive(Deserialize)]
 struct Properties {
     #[serde(rename = "proj:epsg", default)]
-    epsg: Option<u32>,
+    epsg: Value,
     #[serde(rename = "proj:code", default)]
-    code: Option<String>,
+    code: Value,
     #[serde(rename = "proj:wkt2", default)]
-    wkt: Option<String>,
+    wkt: Value,
     #[serde(rename = "proj:bbox", default)]
-    bounds: Option<Vec<f64>>,
+    bounds: Value,
 }
 
 #[derive(Deserialize)]
@@ -134,23 +141,46 @@ impl Reader {
             let what = format!("is one of more than {MOST_DOCUMENTS} documents of a list: divide the list");
             return Err(Error::input(path, what));
         }
-        let read = match is_remote(path) {
-            false => {
-                let file = File::open(path).map_err(Error::io("read", path))?;
-                serde_json::from_reader(BufReader::new(file))
-            }
+        match is_remote(path) {
+            false => parsed(path, &std::fs::read(path).map_err(Error::io("read", path))?),
             true => {
                 let url = address(&path.to_string_lossy())?;
                 let request = WholeRequest::new(path, &url, MOST, ABOUT);
                 let missing = || Error::Config(format!("there is no file {}", path.display()));
-                serde_json::from_slice(request.fetch(false)?.ok_or_else(missing)?.bytes())
+                parsed(path, request.fetch(false)?.ok_or_else(missing)?.bytes())
             }
-        };
-        read.map_err(|error| match error.is_io() {
-            true => Error::io("read", path)(error.into()),
-            false => Error::input(path, format!("is not a readable JSON list of point clouds (STAC or VPC): {error}")),
-        })
+        }
     }
+}
+
+/// Returns the document with the text `bytes`, also if it has numbers that JSON does not have but some programs write.
+fn parsed(path: &Path, bytes: &[u8]) -> Result<Document> {
+    let document = serde_json::from_slice(bytes).or_else(|error| match without_nan(bytes) {
+        Some(bytes) => serde_json::from_slice(&bytes),
+        None => Err(error),
+    });
+    document.map_err(|error| {
+        Error::input(path, format!("is not a readable JSON list of point clouds (STAC or VPC): {error}"))
+    })
+}
+
+/// Returns a text with `null` in the places of `NaN` and `Infinity`; `None` if it has neither.
+fn without_nan(text: &[u8]) -> Option<Vec<u8>> {
+    let mut rest = text;
+    let (mut replaced, mut has_found, mut is_in_string) = (Vec::with_capacity(text.len()), false, false);
+    while let [first, ..] = rest {
+        let word = NO_JSON.iter().find(|word| !is_in_string && rest.starts_with(word.as_bytes()));
+        let taken = match (first, word) {
+            (_, Some(word)) => word.len(),
+            (b'\\', _) => 2.min(rest.len()),
+            _ => 1,
+        };
+        is_in_string ^= *first == b'"';
+        has_found |= word.is_some();
+        replaced.extend_from_slice(if word.is_some() { b"null" } else { &rest[..taken] });
+        rest = &rest[taken..];
+    }
+    has_found.then_some(replaced)
 }
 
 impl Document {
@@ -159,11 +189,14 @@ impl Document {
         let mut clouds = Vec::new();
         match self.kind.as_str() {
             "FeatureCollection" => {
-                for (index, item) in self.features.iter().enumerate() {
-                    add_clouds(path, (&item.id, index), &item.properties, &item.assets, &mut clouds)?;
+                for (number, text) in (1..).zip(&self.features) {
+                    let item: Item = serde_json::from_str(text.get()).map_err(|error| {
+                        Error::input(path, format!("item {number} is not a readable item of STAC: {error} of the item"))
+                    })?;
+                    add_clouds(path, (&item.id, number), &item.properties, &item.assets, &mut clouds)?;
                 }
             }
-            "Feature" => add_clouds(path, (&self.id, 0), &self.properties, &self.assets, &mut clouds)?,
+            "Feature" => add_clouds(path, (&self.id, 1), &self.properties, &self.assets, &mut clouds)?,
             "Collection" | "Catalog" => {}
             _ if self.hierarchy.is_some() => {
                 return Err(Error::input(
@@ -212,27 +245,28 @@ impl Link {
     }
 }
 
-/// Adds the clouds of an item, of which a message tells its id or its place in the list.
+/// Adds the clouds of an item, of which a message tells its id, or its number from 1 on.
 fn add_clouds(
     path: &Path,
-    (id, index): (&Option<String>, usize),
+    (id, number): (&Value, usize),
     properties: &Option<Properties>,
     assets: &BTreeMap<String, Asset>,
     clouds: &mut Vec<ListedCloud>,
 ) -> Result<()> {
-    let refused = |what: String| {
-        let item = id.as_ref().map_or_else(|| format!("item {}", index + 1), |id| format!("item {id:?}"));
-        Error::input(path, format!("{item}: {what}"))
-    };
+    let item = if id.is_null() { format!("item {number}") } else { format!("item {id}") };
+    let refused = |what: String| Error::input(path, format!("{item}: {what}"));
     let hrefs = cloud_assets(assets);
     if hrefs.is_empty() {
         let what = "has no asset that is a point cloud: none ends with .las, .laz or ept.json, or has the role \"data\" and no other ending";
         return Err(refused(what.into()));
     }
-    let claim = properties.as_ref().and_then(Properties::claim);
+    let (claim, unusable_box) = match properties.as_ref().map_or(Ok(None), Properties::claim) {
+        Ok(claim) => (claim, None),
+        Err(what) => (None, Some(format!("{item} (number {number}) has {what}"))),
+    };
     for href in hrefs {
         let path = place_of(path, href).map_err(refused)?;
-        clouds.push(ListedCloud { path, claim: claim.clone() });
+        clouds.push(ListedCloud { path, claim: claim.clone(), unusable_box: unusable_box.clone() });
     }
     Ok(())
 }
@@ -268,15 +302,49 @@ fn cloud_assets(assets: &BTreeMap<String, Asset>) -> Vec<&str> {
 
 impl Properties {
     /// Returns where the item lies in its own system, if it says both.
-    fn claim(&self) -> Option<ListedBox> {
-        let [xmin, ymin, xmax, ymax] = match self.bounds.as_deref()? {
-            &[xmin, ymin, xmax, ymax] | &[xmin, ymin, _, xmax, ymax, _] => [xmin, ymin, xmax, ymax],
-            _ => return None,
-        };
-        let is_box = xmin <= xmax && ymin <= ymax && [xmin, ymin, xmax, ymax].iter().all(|value| value.is_finite());
-        let code = self.code.clone().or_else(|| self.epsg.map(|code| format!("EPSG:{code}")));
-        let crs = code.or_else(|| self.wkt.clone()).filter(|_| is_box)?;
-        Some(ListedBox { crs: Arc::from(crs.trim()), bounds: [xmin, ymin, xmax, ymax] })
+    ///
+    /// # Errors
+    /// Says what it has instead of a box, or of a system.
+    fn claim(&self) -> std::result::Result<Option<ListedBox>, String> {
+        let [code, wkt] =
+            [&self.code, &self.wkt].map(|value| value.as_str().map(str::trim).filter(|text| !text.is_empty()));
+        let crs = code.map(str::to_string).or_else(|| epsg_code(&self.epsg)).or_else(|| wkt.map(str::to_string));
+        if self.bounds.is_null() {
+            return Ok(None);
+        }
+        let bounds = box_in(&self.bounds).ok_or_else(|| format!("proj:bbox {}", shown(&self.bounds)))?;
+        let systems = [("proj:code", &self.code), ("proj:epsg", &self.epsg), ("proj:wkt2", &self.wkt)];
+        match (crs, systems.into_iter().find(|(_, value)| !value.is_null())) {
+            (Some(crs), _) => Ok(Some(ListedBox { crs: Arc::from(crs), bounds })),
+            (None, Some((name, value))) => Err(format!("{name} {}", shown(value))),
+            (None, None) => Ok(None),
+        }
+    }
+}
+
+/// Returns the code of a system, which is a number, or its digits.
+fn epsg_code(value: &Value) -> Option<String> {
+    let number = value.as_u64().or_else(|| value.as_str()?.trim().parse().ok());
+    number.and_then(|number| u32::try_from(number).ok()).map(|number| format!("EPSG:{number}"))
+}
+
+/// Returns the least x and y and the greatest of a box of two or three dimensions.
+fn box_in(value: &Value) -> Option<[f64; 4]> {
+    let numbers: Vec<f64> = value.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
+    let bounds = match numbers[..] {
+        [xmin, ymin, xmax, ymax] | [xmin, ymin, _, xmax, ymax, _] => [xmin, ymin, xmax, ymax],
+        _ => return None,
+    };
+    let is_box = bounds[0] <= bounds[2] && bounds[1] <= bounds[3] && bounds.iter().all(|number| number.is_finite());
+    is_box.then_some(bounds)
+}
+
+/// Returns the beginning of a value, for messages.
+fn shown(value: &Value) -> String {
+    let text = value.to_string();
+    match text.char_indices().nth(MOST_SHOWN) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text,
     }
 }
 
@@ -326,6 +394,39 @@ mod tests {
             r#""proj:epsg": 2056, "proj:bbox": [1, 2, 3]"#,
         ] {
             assert_eq!(claim(nothing), None, "{nothing}");
+        }
+        assert_eq!(&*claim(r#""proj:epsg": "25832", "proj:bbox": [1, 2, 3, 4]"#).unwrap().crs, "EPSG:25832");
+    }
+
+    #[test]
+    fn a_box_that_cannot_be_used_is_told_with_its_item() {
+        let unusable = |properties: &str| {
+            let item = ITEM.replace(r#""proj:epsg": 2056, "proj:bbox": [1, 2, 3, 4, 5, 6]"#, properties);
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("l.vpc");
+            let other = ITEM.replace("tile", "other");
+            std::fs::write(&path, format!(r#"{{"type": "FeatureCollection", "features": [{other}, {item}]}}"#))
+                .unwrap();
+            let mut found = clouds_of(&path).unwrap();
+            assert!(found[0].claim.is_some() && found[0].unusable_box.is_none());
+            found.remove(1).unusable_box
+        };
+        let item = r#"item "tile-1" (number 2) has "#;
+        for (bounds, shown) in [
+            ("[3, 2, 1, 4]", "[3,2,1,4]"),
+            ("[1, 2, 3]", "[1,2,3]"),
+            ("[1, NaN, 3, Infinity]", "[1,null,3,null]"),
+            ("[1, null, 3, 4]", "[1,null,3,4]"),
+            ("\"a NaN\"", "\"a NaN\""),
+            ("{}", "{}"),
+        ] {
+            let found = unusable(&format!(r#""proj:epsg": 2056, "proj:bbox": {bounds}"#)).unwrap();
+            assert_eq!(found, format!("{item}proj:bbox {shown}"));
+        }
+        let found = unusable(r#""proj:epsg": -7, "proj:bbox": [1, 2, 3, 4]"#).unwrap();
+        assert_eq!(found, format!("{item}proj:epsg -7"));
+        for fine in [r#""proj:bbox": null"#, r#""proj:epsg": null, "proj:bbox": [1, 2, 3, 4]"#, r#""proj:epsg": "x""#] {
+            assert_eq!(unusable(fine), None, "{fine}");
         }
     }
 
@@ -384,6 +485,11 @@ mod tests {
         assert!(error(&[("l.vpc", empty)]).contains("l.vpc: item \"a\": has no asset that is a point cloud"));
         let unnamed = empty.replace(r#""id": "a", "#, "");
         assert!(error(&[("l.vpc", &unnamed)]).contains("item 1: has no asset"));
+        let number =
+            format!(r#"{{"type": "FeatureCollection", "features": [{ITEM}, {}]}}"#, ITEM.replace(r#""a.png""#, "5"));
+        assert!(
+            error(&[("l.vpc", &number)]).contains("item 2 is not a readable item of STAC: invalid type: integer `5`")
+        );
         let ftp = ITEM.replace("./tile.copc.laz", "ftp://host/tile.copc.laz");
         assert!(error(&[("l.json", &ftp)]).contains("item \"tile-1\": files can be read by https://"));
         assert!(error(&[("l.json", "{\"type\": 1}")]).contains("at line 1 column"));

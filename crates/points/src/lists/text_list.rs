@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::file::random_access::RandomAccessFile;
 use crate::lists::listed_cloud::{ListedCloud, is_cloud, name_in, place_of};
+use crate::remote::name::is_url;
 use sys::{Error, Result};
 
 /// The bytes by which a list is told from a table of points.
@@ -14,6 +15,9 @@ const MOST: u64 = 1 << 28;
 
 /// The endings of texts that a line may name.
 const TEXTS: [&str; 5] = [".csv", ".xyz", ".asc", ".pts", ".tsv"];
+
+/// The endings of lists.
+const LISTS: [&str; 4] = [".txt", ".lst", ".vpc", ".json"];
 
 /// Returns the clouds that the text names; `None` if its first lines name none, or one of them is a row of numbers.
 ///
@@ -34,21 +38,45 @@ pub(super) fn clouds_of(path: &Path) -> Result<Option<Vec<ListedCloud>>> {
     let mut clouds = Vec::new();
     for (number, line) in entries(&text) {
         let refused = |what: String| Error::input(path, format!("line {number}: {what}"));
+        let place = place_of(path, line).map_err(refused)?;
+        if is_pattern(line) && !place.exists() {
+            return Err(refused(format!(
+                "{line:?} is a pattern, and a list takes paths and URLs; fix: write a line for each file, or write the pattern into [input] files"
+            )));
+        }
+        if names_list(line) {
+            return Err(refused(format!(
+                "{line:?} may be a list or a table, and a list names .las, .laz, ept.json, and texts such as .csv; fix: write it into [input] files"
+            )));
+        }
         if !names_cloud(line) {
             return Err(refused(format!(
                 "{line:?} is not a point cloud (.las, .laz, ept.json, or a text such as .csv), as the other lines are; fix: remove the line, or put # before it"
             )));
         }
-        clouds.push(ListedCloud { path: place_of(path, line).map_err(refused)?, claim: None });
+        clouds.push(ListedCloud { path: place, claim: None, unusable_box: None });
     }
     Ok(Some(clouds))
 }
 
-/// Returns whether a line names a point cloud, and no line is a row of numbers. The last line is looked at only if the text `is_whole`.
+/// Returns whether a line names a point cloud, and no line is a row of numbers. A text of nothing but patterns and lists is meant as a list
+/// too. The last line is looked at only if the text `is_whole`.
 fn is_list(head: &str, is_whole: bool) -> bool {
     let end = if is_whole { head.len() } else { head.rfind('\n').unwrap_or(0) };
     let lines = || entries(&head[..end]).map(|(_, line)| line);
-    lines().any(names_cloud) && !lines().any(is_row)
+    let is_meant = |line| is_pattern(line) || names_list(line);
+    (lines().any(names_cloud) || lines().next().is_some() && lines().all(is_meant)) && !lines().any(is_row)
+}
+
+/// Returns whether a line has characters of patterns, and none that separate columns.
+fn is_pattern(line: &str) -> bool {
+    !is_url(line) && line.contains(['*', '?']) && !line.contains([',', ';', '\t', ' '])
+}
+
+/// Returns whether a line names another list.
+fn names_list(line: &str) -> bool {
+    let name = name_in(line);
+    LISTS.iter().any(|ending| name.len() > ending.len() && name.ends_with(ending)) && !is_cloud(line)
 }
 
 /// Returns whether a line begins with three numbers, as those of tables of points do.
@@ -57,11 +85,18 @@ fn is_row(line: &str) -> bool {
     (0..3).all(|_| fields.next().is_some_and(|field| field.parse::<f64>().is_ok()))
 }
 
-/// Returns the lines that count, with their numbers from 1 on.
+/// Returns the lines that count, with their numbers from 1 on, and without quotes around them.
 fn entries(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = text.lines().map(str::trim).enumerate().map(|(index, line)| (index + 1, line));
+    let lines = lines.map(|(number, line)| (number, unquoted(line)));
     lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+/// Returns a line without the quotes around it. Those of several columns stay.
+fn unquoted(line: &str) -> &str {
+    let inner = line.strip_prefix('"').and_then(|line| line.strip_suffix('"'));
+    inner.filter(|inner| !inner.contains('"')).unwrap_or(line)
 }
 
 fn names_cloud(line: &str) -> bool {
@@ -87,7 +122,7 @@ mod tests {
 
     #[test]
     fn lines_name_clouds() {
-        let text = "\u{feff}# tiles\r\na.laz\r\n\n  b c/1.LAS \nhttps://host/d.copc.laz?key=1\n/e/ept.json\nf.xyz";
+        let text = "\u{feff}# tiles\r\na.laz\r\n\n  \"b c/1.LAS\" \nhttps://host/d.copc.laz?key=1\n/e/ept.json\nf.xyz";
         let expected = ["a.laz", "b c/1.LAS", "https://host/d.copc.laz?...", "/e/ept.json", "f.xyz"];
         assert_eq!(clouds(text.as_bytes()).unwrap().unwrap(), expected.map(PathBuf::from));
     }
@@ -103,6 +138,9 @@ mod tests {
             "",
             "# a.laz\n",
             ".csv\n",
+            "*** survey ***\n1 2 3\n",
+            "x*,y,z\n1,2,3\n",
+            "area.txt\n1 2 3\n",
             "\u{0}a.la\n",
         ] {
             assert_eq!(clouds(text.as_bytes()).unwrap(), None, "{text:?}");
@@ -118,6 +156,14 @@ mod tests {
         assert!(error.to_string().contains("not in UTF-8"), "{error}");
         let error = clouds(b"tiles of 2024\na.laz\nb.laz\n").unwrap_err().to_string();
         assert!(error.contains("line 1: \"tiles of 2024\" is not a point cloud"), "{error}");
+        for text in ["tiles/*.laz\n", "tiles/s??.l??\n*\n", "a.laz\nb*\n"] {
+            let error = clouds(text.as_bytes()).unwrap_err().to_string();
+            assert!(error.contains("is a pattern, and a list takes paths and URLs"), "{text:?}: {error}");
+        }
+        for text in ["tiles.txt\n", "a.laz\nb.vpc\n"] {
+            let error = clouds(text.as_bytes()).unwrap_err().to_string();
+            assert!(error.contains("may be a list or a table, and a list names .las"), "{text:?}: {error}");
+        }
         let error = clouds(b"a.laz\nftp://host/b.laz\n").unwrap_err().to_string();
         assert!(error.contains("line 2: files can be read by https://"), "{error}");
     }

@@ -109,7 +109,14 @@ impl Columns {
         let mut rows: Vec<(usize, &[u8])> = lines.iter().copied().enumerate().collect();
         rows.retain(|(_, line)| !is_skipped(line, &comments));
         let Some(&(first_at, first)) = rows.first() else {
-            return Err(Error::input(path, "has no line with numbers in it"));
+            let is_empty = lines.iter().all(|line| line.trim_ascii().is_empty());
+            return Err(Error::input(
+                path,
+                match is_empty {
+                    true => "has no line with numbers in it",
+                    false => "has no line with numbers in it, and names no files: all its lines are comments",
+                },
+            ));
         };
         let mut header_lines = 0;
         let mut given = options.delimiter;

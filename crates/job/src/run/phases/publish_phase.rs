@@ -1,7 +1,7 @@
 //! Step 8: the coarser tiles above the parts, what is beside the tiles, and the report.
 
 use crate::durable::atomic_file::{PendingFile, write_pending};
-use crate::durable::journal::PublishedFile;
+use crate::durable::file_list::listed;
 use crate::index::{PartIndex, TileIndex};
 use crate::levels::hierarchy::Hierarchy;
 use crate::levels::make_level::{Child, LevelStats};
@@ -47,7 +47,6 @@ use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
 use points::PointCounts;
 use serde::de::IgnoredAny;
-use std::path::Path;
 use sys::{Error, Result, Warnings};
 use tiles::checksums::{Checksum, list_text};
 use tiles::color::Coloring;
@@ -586,14 +585,5 @@ fn write_report(
 fn list_of_files(run: &WholeRun) -> Result<Vec<(String, Checksum)>> {
     let directory = run.directory;
     let of_parts = PartJournals::of(directory, run.job_id)?;
-    let mut files: Vec<PublishedFile> = run.journal.files().into_iter().chain(of_parts.files().cloned()).collect();
-    files.retain(|file| directory.is_result(&file.name));
-    files.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok(files.into_iter().map(|file| (slashed(&file.name), file.checksum)).collect())
-}
-
-/// Returns a path with slashes on every system.
-fn slashed(path: &Path) -> String {
-    let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
-    parts.join("/")
+    Ok(listed(directory, run.journal.files().into_iter().chain(of_parts.files().cloned()).collect()))
 }

@@ -70,7 +70,17 @@ pub(crate) fn end_without_changes(directory: &JobDirectory) -> Result<bool> {
     }
     place_changes(directory)?;
     remove_file(&waits)?;
+    mark_placed(directory)?;
     Ok(was_interrupted)
+}
+
+/// Marks that all results are in their places: what differs there from now on was changed by others.
+///
+/// # Errors
+/// [`Error::Io`] if the mark cannot be made.
+pub(crate) fn mark_placed(directory: &JobDirectory) -> Result<()> {
+    let mark = directory.placed_mark();
+    disk::open_or_create(&mark).map(drop).map_err(Error::io("create", &mark))
 }
 
 /// Puts the list of changes in its place, if one waits.

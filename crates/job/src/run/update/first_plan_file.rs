@@ -1,14 +1,28 @@
 //! The plan of the first run of a job with `--update`, which decides how its plane is cut.
 
-use crate::durable::atomic_file::publish;
+use crate::durable::atomic_file::{publish, write_pending};
 use crate::durable::directory::JobDirectory;
 use crate::plan::job_plan::Plan;
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
 use sys::disk::exists;
 use sys::{Error, Result};
+use tiles::checksums::Checksum;
 
-/// Returns the plan of the first run, if it is there.
+/// The plan of the first run in its file. No journal has its checksum.
+#[derive(Serialize, Deserialize)]
+struct FirstPlan {
+    /// The checksum of the plan's text.
+    checksum: Checksum,
+    plan: Box<RawValue>,
+}
+
+/// Returns the plan of the first run, if it is there and whole.
 pub(crate) fn first_plan(directory: &JobDirectory) -> Option<Plan> {
-    Plan::read(&directory.first_plan()).ok()
+    let text = std::fs::read(directory.first_plan()).ok()?;
+    let file: FirstPlan = serde_json::from_slice(&text).ok()?;
+    let text = file.plan.get();
+    if Checksum::of(text.as_bytes()) == file.checksum { Plan::parse(text).ok() } else { None }
 }
 
 /// Tells whether the plan of the first run is there.
@@ -29,6 +43,9 @@ pub(crate) fn keep_first_plan(directory: &JobDirectory, plan: &Plan) -> Result<(
     if !plan.options.updates || has_first_plan(directory)? {
         return Ok(());
     }
-    plan.write(&path)?;
+    let broken = |e| Error::Broken(format!("{}: {e}", path.display()));
+    let plan = serde_json::value::to_raw_value(plan).map_err(broken)?;
+    let file = FirstPlan { checksum: Checksum::of(plan.get().as_bytes()), plan };
+    write_pending(&path, &serde_json::to_vec(&file).map_err(broken)?)?;
     publish(std::slice::from_ref(&path))
 }

@@ -4,4 +4,5 @@
 
 pub(crate) mod changes;
 pub(crate) mod first_plan_file;
+pub(crate) mod mending;
 pub(crate) mod outdated;
