@@ -128,7 +128,11 @@ impl<'a> Summary<'a> {
     fn update(&self) -> Option<String> {
         let ChangeCounts { changed, added, removed } = self.report.update?;
         let files = counted(changed, "file");
-        Some(format!("{files} changed, {} new, {} gone: see update.json", grouped(added), grouped(removed)))
+        let whole = match self.report.parts {
+            1 => "; the job has one part, which was computed as a whole",
+            _ => "",
+        };
+        Some(format!("{files} changed, {} new, {} gone: see update.json{whole}", grouped(added), grouped(removed)))
     }
 
     fn costs(&self) -> String {
