@@ -15,7 +15,7 @@ use crate::fill::filled;
 use crate::morphology::{EMPTY, dilation, erosion};
 use crate::pits::without_pits;
 use crate::plane::{from_middle, with_surroundings};
-use crate::regions::ground_regions;
+use crate::regions::{RegionRule, ground_regions};
 use crate::sizes::GroundSizes;
 use crate::slope::slopes;
 use crate::terrain::{NEIGHBOUR, Terrain};
@@ -31,6 +31,11 @@ const BY_TWO: i32 = 20;
 const ALONG: Growth = Growth { radius: 8.0, rounds: 30, agreeing: 2, bend: 0.75, steepest: 1.5, is_covered: false };
 /// Then those that others have cut off, if the ground goes on smoothly on more sides.
 const AROUND: Growth = Growth { radius: 3.0, rounds: 10, agreeing: 3, bend: 0.5, steepest: 1.0, is_covered: true };
+/// Regions that came back are ground if nine twentieths of their border go on.
+const IN_GROWTH: RegionRule = RegionRule { goes_on: [9, 20], looks_beyond: false };
+/// Halls may be so many times as wide as the largest building: they have edges all around, and less than a fifth of their border goes on.
+const HALL: f64 = 2.5;
+const IN_HALLS: RegionRule = RegionRule { goes_on: [1, 5], looks_beyond: true };
 /// So many times cells come back that lie near the surface of the others.
 const JOINS: usize = 3;
 /// How much farther they may lie from it on a slope of one, in widths of a cell.
@@ -94,7 +99,10 @@ fn kept_cells<E>(
     let within = |radius: f64| erosion(lowest, radius).each(false, |least| least != EMPTY);
     let (covered, reached) = (within(NEIGHBOURS), within(EXTENSION / width));
     let surface = filled(lowest);
-    let cut = cut_off(&only_where(&surface, &reached), &covered, &reached, (width, sizes), check)?;
+    let mut opened = only_where(&surface, &reached);
+    let largest = sizes.largest_building.0 / 2.0;
+    let discs = Discs { covered: &covered, reached: &reached, width, slope: sizes.slope.0 };
+    let cut = discs.cut_off(&mut opened, radii(largest), check)?;
     let uncut = covered.with(&cut, false, |is_covered, radius| is_covered && radius == 0.0);
     let terrain = Terrain { surface: &surface, covered: &covered, cut: &cut, width: width as f32 };
     let mut kept = uncut.clone();
@@ -104,7 +112,14 @@ fn kept_cells<E>(
             kept = grown(&kept, &terrain, growth);
         }
     }
-    ground_regions(&uncut, &kept, &terrain, check)
+    let back = kept.with(&uncut, false, |is_kept, is_uncut| is_kept && !is_uncut);
+    kept = ground_regions(&kept, (&uncut, &back), &terrain, IN_GROWTH, check)?;
+    let halls = radii(HALL * largest).into_iter().filter(|radius| *radius > largest).collect();
+    let cut = discs.cut_off(&mut opened, halls, check)?;
+    let wide = kept.with(&cut, false, |is_kept, radius| is_kept && radius > 0.0);
+    // Corners of a hall are cut off by smaller discs, and came back with it: it does not go on into them.
+    let low = uncut.with(&cut, false, |is_uncut, radius| is_uncut && radius == 0.0);
+    ground_regions(&kept, (&low, &wide), &terrain, IN_HALLS, check)
 }
 
 /// Returns `heights` in the cells that are `wanted`.
@@ -112,31 +127,45 @@ pub(crate) fn only_where(heights: &Cells<f32>, wanted: &Cells<bool>) -> Cells<f3
     heights.with(wanted, EMPTY, |height, is_wanted| if is_wanted { height } else { EMPTY })
 }
 
-/// Returns for each cell the radius in metres of the last opening that cut it off the `surface`, which is there where discs may reach; 0 if none
-/// did.
-fn cut_off<E>(
-    surface: &Cells<f32>,
-    covered: &Cells<bool>,
-    reached: &Cells<bool>,
-    (width, sizes): (f64, GroundSizes),
-    check: &dyn Fn() -> Result<(), E>,
-) -> Result<Cells<f32>, E> {
-    let (mut last, mut cut) = (surface.clone(), covered.each(0.0, |_| 0.0));
-    for radius in radii(sizes.largest_building.0 / 2.0) {
-        check()?;
-        // A disc just so wide has the cells at its rim.
-        let cells = radius / width + 0.01;
-        if cells < 1.0 {
-            continue;
+/// What openings with discs need.
+struct Discs<'a> {
+    /// The cells that have points around.
+    covered: &'a Cells<bool>,
+    /// The cells that discs may reach.
+    reached: &'a Cells<bool>,
+    /// The width of a cell in metres.
+    width: f64,
+    /// Of the steepest ground.
+    slope: f64,
+}
+
+impl Discs<'_> {
+    /// Opens the `surface`, which is there where discs may reach, with discs of these radii in metres, each on the result of the one before. Returns
+    /// for each cell the radius of the last opening that cut it off; 0 if none did.
+    fn cut_off<E>(
+        &self,
+        surface: &mut Cells<f32>,
+        radii: Vec<f64>,
+        check: &dyn Fn() -> Result<(), E>,
+    ) -> Result<Cells<f32>, E> {
+        let Discs { covered, reached, width, slope } = *self;
+        let mut cut = covered.each(0.0, |_| 0.0);
+        for radius in radii {
+            check()?;
+            // A disc just so wide has the cells at its rim.
+            let cells = radius / width + 0.01;
+            if cells < 1.0 {
+                continue;
+            }
+            let opened = only_where(&dilation(&only_where(&erosion(surface, cells), reached), cells), reached);
+            let most = (slope * radius) as f32;
+            let is_high = surface.with(&opened, false, |last, opened| last != EMPTY && last - opened > most);
+            let is_cut = is_high.with(covered, false, |is_high, is_covered| is_high && is_covered);
+            cut = cut.with(&is_cut, 0.0, |last, is_cut| if is_cut { radius as f32 } else { last });
+            *surface = opened;
         }
-        let opened = only_where(&dilation(&only_where(&erosion(&last, cells), reached), cells), reached);
-        let most = (sizes.slope.0 * radius) as f32;
-        let is_high = last.with(&opened, false, |last, opened| last != EMPTY && last - opened > most);
-        let is_cut = is_high.with(covered, false, |is_high, is_covered| is_high && is_covered);
-        cut = cut.with(&is_cut, 0.0, |last, is_cut| if is_cut { radius as f32 } else { last });
-        last = opened;
+        Ok(cut)
     }
-    Ok(cut)
 }
 
 /// Returns the radii of the discs in metres, up to the greatest.

@@ -13,8 +13,15 @@ const STEP: f32 = 1.0;
 /// How much a neighbour counts, straight on and across a corner.
 const STRAIGHT: u8 = 10;
 const ACROSS: u8 = 7;
-/// A region is ground if so much of what goes on or falls off goes on: nine twentieths.
-const GOES_ON: [u64; 2] = [9, 20];
+
+/// Which regions are ground.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RegionRule {
+    /// A region is ground if so much of what goes on or falls off goes on: a numerator and a denominator.
+    pub(crate) goes_on: [u64; 2],
+    /// Whether the border also falls off where the next cell, which is not kept, does.
+    pub(crate) looks_beyond: bool,
+}
 
 /// The border of a region at one of its cells.
 #[derive(Clone, Copy, Debug, Default)]
@@ -27,25 +34,27 @@ struct Border {
     falls: u8,
 }
 
-/// Returns the cells that were kept `before`, and of those that came back `after` the regions that are ground. Calls `check` for each block.
+/// Returns the cells that are `kept` without the regions of those that are `doubtful`, and kept too, that are no ground. Their borders may go on into
+/// the `sure` ones. Calls `check` for each block.
 ///
 /// # Errors
 /// Those of `check`.
 pub(crate) fn ground_regions<E>(
-    before: &Cells<bool>,
-    after: &Cells<bool>,
+    kept: &Cells<bool>,
+    (sure, doubtful): (&Cells<bool>, &Cells<bool>),
     terrain: &Terrain,
+    rule: RegionRule,
     check: &dyn Fn() -> Result<(), E>,
 ) -> Result<Cells<bool>, E> {
-    let mut unseen = after.with(before, false, |after, before| after && !before);
-    let borders = borders(before, &unseen, terrain);
-    let mut kept = after.clone();
-    for &place in after.places() {
+    let mut unseen = doubtful.clone();
+    let borders = borders(sure, doubtful, terrain, rule);
+    let mut kept = kept.clone();
+    for &place in doubtful.places() {
         check()?;
         for number in 0..SIDE * SIDE {
             let cell = [place[0] * SIDE + number % SIDE, place[1] * SIDE + number / SIDE];
             if unseen.at(cell) {
-                let (region, is_ground) = region_from(cell, &borders, &mut unseen);
+                let (region, is_ground) = region_from(cell, &borders, &mut unseen, rule);
                 if !is_ground {
                     region.iter().for_each(|cell| set(&mut kept, *cell, false));
                 }
@@ -61,7 +70,12 @@ fn set(cells: &mut Cells<bool>, cell: Place, value: bool) {
 }
 
 /// Returns the cells of the region of `cell`, and tells whether it is ground. They are no longer `unseen` then.
-fn region_from(cell: Place, borders: &Cells<Border>, unseen: &mut Cells<bool>) -> (Vec<Place>, bool) {
+fn region_from(
+    cell: Place,
+    borders: &Cells<Border>,
+    unseen: &mut Cells<bool>,
+    RegionRule { goes_on: [part, whole], .. }: RegionRule,
+) -> (Vec<Place>, bool) {
     let (mut region, mut smooth, mut falls) = (vec![cell], 0u64, 0u64);
     set(unseen, cell, false);
     let mut next = 0;
@@ -78,19 +92,18 @@ fn region_from(cell: Place, borders: &Cells<Border>, unseen: &mut Cells<bool>) -
             }
         }
     }
-    let [part, whole] = GOES_ON;
     (region, whole * smooth >= part * (smooth + falls))
 }
 
-/// Returns the borders of the regions of the cells that have come `back`, among those that were kept `before`.
-fn borders(before: &Cells<bool>, back: &Cells<bool>, terrain: &Terrain) -> Cells<Border> {
+/// Returns the borders of the regions of the `doubtful` cells, among the `sure` ones.
+fn borders(sure: &Cells<bool>, doubtful: &Cells<bool>, terrain: &Terrain, rule: RegionRule) -> Cells<Border> {
     let Terrain { surface, covered, width, .. } = *terrain;
-    back.map(Border::default(), 1, |back| {
-        let (surface, covered) = (surface.window(back.place, 1), covered.window(back.place, 1));
-        let before = before.window(back.place, 1);
-        back.each(|column, row| {
+    doubtful.map(Border::default(), 1, |doubtful| {
+        let (surface, covered) = (surface.window(doubtful.place, 2), covered.window(doubtful.place, 2));
+        let sure = sure.window(doubtful.place, 1);
+        doubtful.each(|column, row| {
             let mut border = Border::default();
-            if !back.at(column, row) {
+            if !doubtful.at(column, row) {
                 return border;
             }
             for (side, [right, up]) in NEIGHBOUR.iter().enumerate() {
@@ -103,11 +116,17 @@ fn borders(before: &Cells<bool>, back: &Cells<bool>, terrain: &Terrain) -> Cells
                 let fall = (here - surface.at(there, above)) / length;
                 let rise = (surface.at(column - right, row - up) - here) / length;
                 let is_edge = || fall > STEP && rise.abs() <= STEP;
-                if back.at(there, above) {
+                let is_edge_beyond = || {
+                    let beyond = [there + right, above + up];
+                    let next = (surface.at(there, above) - surface.at(beyond[0], beyond[1])) / length;
+                    let is_rim = !sure.at(there, above) && covered.at(beyond[0], beyond[1]);
+                    rule.looks_beyond && is_rim && fall.abs() <= STEP && next > STEP
+                };
+                if doubtful.at(there, above) {
                     border.inside |= u8::from(fall.abs() <= STEEPEST) << side;
-                } else if before.at(there, above) && fall.abs() <= SMOOTH {
+                } else if sure.at(there, above) && fall.abs() <= SMOOTH {
                     border.smooth += counts;
-                } else if covered.at(there, above) && is_edge() {
+                } else if covered.at(there, above) && (is_edge() || is_edge_beyond()) {
                     border.falls += counts;
                 }
             }
@@ -122,6 +141,8 @@ mod tests {
     use crate::cells::cell_of;
     use crate::morphology::EMPTY;
 
+    const RULE: RegionRule = RegionRule { goes_on: [9, 20], looks_beyond: false };
+
     /// Returns how many of the cells higher than a metre remain of a surface of 64 by 64 metres, and how many they were.
     fn left_of(height: impl Fn(f32, f32) -> f32 + Sync) -> [usize; 2] {
         let block = || (0..(SIDE * SIDE) as usize).map(|number| cell_of([0, 0], number));
@@ -129,7 +150,11 @@ mod tests {
         let covered = surface.each(false, |_| true);
         let (before, cut) = (surface.each(false, |height| height < 1.0), surface.each(0.0, |_| 8.0));
         let terrain = Terrain { surface: &surface, covered: &covered, cut: &cut, width: 1.0 };
-        let kept = ground_regions(&before, &covered, &terrain, &|| Ok::<_, ()>(())).unwrap();
+        let kept =
+            ground_regions(&covered, (&before, &surface.each(false, |height| height >= 1.0)), &terrain, RULE, &|| {
+                Ok::<_, ()>(())
+            })
+            .unwrap();
         assert!(block().all(|cell| kept.at(cell) || !before.at(cell)), "ground is lost");
         let high = |cells: &Cells<bool>| block().filter(|cell| cells.at(*cell) && !before.at(*cell)).count();
         [high(&kept), high(&covered)]

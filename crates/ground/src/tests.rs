@@ -130,6 +130,40 @@ fn shrubs_on_a_slope_are_no_ground() {
     assert!(wrong < 25, "{wrong} of {}", points.len());
 }
 
+/// Returns a scene of 200 by 150 m with a point in each square metre, where something rises above a gentle slope.
+fn raised(seed: u64, above: impl Fn([f64; 2]) -> f64) -> Vec<Labelled> {
+    let mut random = Random(seed);
+    let point = |number: i32| {
+        let place = [number % 200, number / 200].map(|n| f64::from(n) + random.within(0.0, 1.0));
+        let rise = above(place);
+        let z = 100.0 + 0.03 * place[0] + rise + random.within(-0.04, 0.04);
+        ([place[0], place[1], z].map(|metres| (100.0 * metres).round() as i32), rise == 0.0)
+    };
+    (0..200 * 150).map(point).collect()
+}
+
+/// A hall wider than the largest building has edges all around; of its corners, which smaller discs cut off, some comes back. A mound of its size has
+/// slopes, and a terrace an edge on two sides alone.
+#[test]
+fn halls_go_and_mounds_and_terraces_stay() {
+    let from_border = |[x, y]: [f64; 2], [west, south, east, north]: [f64; 4]| {
+        (x - west).min(east - x).min(y - south).min(north - y).max(0.0)
+    };
+    let taken = |above: &dyn Fn([f64; 2]) -> f64| {
+        let points = raised(800, above);
+        let ground = found(&points);
+        assert!(points.iter().filter(|(point, is_low)| *is_low && !ground.has(*point)).count() < 300, "ground is lost");
+        let raised = points.iter().filter(|(_, is_low)| !is_low);
+        raised.clone().filter(|(point, _)| ground.has(*point)).count() as f64 / raised.count() as f64
+    };
+    let hall = |place| if from_border(place, [50.0, 40.0, 130.0, 105.0]) > 0.0 { 9.0 } else { 0.0 };
+    let mound = |place| (0.4 * from_border(place, [40.0, 30.0, 155.0, 120.0])).min(9.0);
+    let terrace = |[x, y]: [f64; 2]| if x > 60.0 && y > 50.0 { 9.0 } else { 0.0 };
+    assert!(taken(&hall) < 0.3, "{}", taken(&hall));
+    assert!(taken(&mound) > 0.95, "{}", taken(&mound));
+    assert!(taken(&terrace) > 0.95, "{}", taken(&terrace));
+}
+
 /// Adds the points to `all` in another order, piece by piece.
 fn in_pieces<C: PointCollector>(points: &[Labelled], all: &mut C) {
     let mut pieces: Vec<C> = (0..7).map(|_| all.emptied()).collect();
