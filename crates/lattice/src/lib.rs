@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 /// The raw integer of a coordinate that no other raw integer can hold. It lies outside every lattice.
 pub const BEYOND: i64 = i64::MIN;
 
-/// So many steps of the lattice of places are a step of that of points.
-const PARTS_OF_STEP: i64 = 1000;
+/// So many steps of the lattice of places are a step of that of points: the most that can be had.
+const PARTS_OF_STEP: [i64; 4] = [1000, 100, 10, 2];
 
 /// The lattice of a job, in source units.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -52,22 +52,22 @@ impl Lattice {
     }
 
     /// Returns a finer lattice in x and y, for places that are not those of points, and the number of its steps in one of this: a thousand, or
-    /// one where world coordinates would need more digits than a decimal has.
+    /// fewer where world coordinates would need more digits than a decimal has.
     pub fn for_places(&self) -> (Lattice, i64) {
         let is_exact = |lattice: &Lattice, axis: usize, i: i64| {
             let back =
                 lattice.exact_world(axis, i)?.checked_sub(lattice.offset[axis])?.checked_div(lattice.resolution)?;
             Some(back == Decimal::from(i))
         };
-        let finer = || {
-            let resolution = self.resolution.checked_div(Decimal::from(PARTS_OF_STEP))?;
+        let finer = |parts: i64| {
+            let resolution = self.resolution.checked_div(Decimal::from(parts))?;
             let lattice = Lattice { resolution, ..self.clone() };
-            let ends = [0, 1]
-                .into_iter()
-                .flat_map(|axis| [i32::MIN, i32::MAX].map(|i| (axis, PARTS_OF_STEP * i64::from(i) + 1)));
-            ends.into_iter().all(|(axis, i)| is_exact(&lattice, axis, i).unwrap_or(false)).then_some(lattice)
+            let ends =
+                [0, 1].into_iter().flat_map(|axis| [i32::MIN, i32::MAX].map(|i| (axis, parts * i64::from(i) + 1)));
+            let is_fine = ends.into_iter().all(|(axis, i)| is_exact(&lattice, axis, i).unwrap_or(false));
+            is_fine.then_some((lattice, parts))
         };
-        finer().map_or_else(|| (self.clone(), 1), |lattice| (lattice, PARTS_OF_STEP))
+        PARTS_OF_STEP.into_iter().find_map(finer).unwrap_or_else(|| (self.clone(), 1))
     }
 
     /// Returns the step along `axis` (0: x, 1: y, 2: z).

@@ -34,11 +34,19 @@ impl ContourStats {
     /// Returns what the user should know about a file without lines.
     pub(crate) fn warning(&self) -> Option<String> {
         (self.lines == 0).then(|| {
-            "contours.gpkg has no line: no level lies between the lowest and the highest point; fix: a smaller [output.contours] interval, or \
-             other levels"
+            "contours.gpkg has no line: no level crosses the terrain; fix: [output] contours with a smaller interval, or other levels"
                 .into()
         })
     }
+}
+
+/// Returns what the user should know about a drawing whose heights are in another unit than x and y.
+pub(crate) fn drawing_warning(plan: &Plan) -> Option<String> {
+    let extras = plan.frame.extras();
+    let has_drawing = plan.options.output.contours.as_ref().is_some_and(|contours| contours.dxf);
+    (has_drawing && extras.metres_per_unit != extras.metres_per_unit_z).then(|| {
+        "contours.dxf: heights are in another unit than x and y, and programs expect one unit for all; fix: scale the heights there".into()
+    })
 }
 
 /// Contour lines that are to be written.

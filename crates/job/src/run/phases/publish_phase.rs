@@ -11,7 +11,7 @@ use crate::plan::job_plan::Plan;
 use crate::plan::no_points::no_triangle;
 use crate::progress::number_text::grouped;
 use crate::publish::classified::{ClassifiedInputs, write_all};
-use crate::publish::contours::write_contours::{ContourStats, ContourWork};
+use crate::publish::contours::write_contours::{ContourStats, ContourWork, drawing_warning};
 use crate::publish::exports::write_exports::{ExportWork, ExportedFile, Exports};
 use crate::publish::flat_tile::FlatScene;
 use crate::publish::height_offset_check::unused_height_offset;
@@ -365,6 +365,7 @@ fn publish(
     }
     warnings.extend(height_unit_warning(&plan.crs));
     warnings.extend(contours.and_then(|contours| contours.warning()));
+    warnings.extend(drawing_warning(plan));
     warnings.extend(hull_warning(plan, written.hull));
     warnings.extend(check_photo(plan)?);
     warnings.extend(without_pixel_warning(plan, written.stats.without_pixel));
