@@ -238,7 +238,12 @@ fn exit_code_and_last_line_tell_proved_from_as_far_as_can_be_told() {
     let (_folder, cloud, job) = every_file("none");
     let inputs = ["--input", cloud.to_str().unwrap()];
     const TOLD: &str = "no error found, but not proved";
-    ends_with(&job, &[], 0, "proved: the exact Delaunay triangulation");
+    ends_with(
+        &job,
+        &[],
+        0,
+        "proved: the exact Delaunay triangulation of its vertices; --input compares them with the points",
+    );
     ends_with(&job, &inputs, 0, "proved: the exact Delaunay triangulation of the inputs' points");
     let without = |name: &str, code: i32, last: &str| {
         let (from, aside) = (job.out().join(name), job.folder().join("aside"));

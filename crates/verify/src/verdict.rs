@@ -195,7 +195,9 @@ impl Verdict {
                 "proved: the exact Delaunay triangulation of points of the inputs, all others within max_error"
             }
             (Conclusion::Proved, _, true) => "proved: the exact Delaunay triangulation of the inputs' points",
-            (Conclusion::Proved, _, false) => "proved: the exact Delaunay triangulation",
+            (Conclusion::Proved, _, false) => {
+                "proved: the exact Delaunay triangulation of its vertices; --input compares them with the points"
+            }
             (Conclusion::AsFarAsCanBeTold, ..) => "no error found, but not proved",
             (Conclusion::Failed, true, _) => "failed: files are not as the job wrote them",
             (Conclusion::Failed, false, true) => "failed: not the Delaunay triangulation of the inputs' points",

@@ -384,6 +384,8 @@ fn publish(
     let fits = fits_one_file(tiles);
     if output.imagery.is_some() && !output.page {
         warnings.push("[output] imagery has no effect: the page shows it; fix: [output] page = true".to_string());
+    } else if output.imagery.is_some() && placement.is_none() {
+        warnings.push("the page shows no imagery, because the terrain is not on the globe".to_string());
     }
     let page_of_others = output.page && run.directory.has_page_of_others()?;
     if page_of_others {
