@@ -1,6 +1,6 @@
 //! The ground of a cloud: which points lie on it.
 
-use crate::cells::Cells;
+use crate::cells::{CELLS, Cells};
 use crate::density::{CoveredArea, PointCollector};
 use crate::find::{GroundCells, LowestCells, find_ground};
 use crate::lowest::{LowestHeights, metres_above};
@@ -50,7 +50,8 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Finds the ground of `points`, which are all in memory. Calls `check` now and then, to be stopped.
+    /// Finds the ground of `points`, which are all in memory; `None` if it may have more than `most` cells. Calls `check` now and then, to be
+    /// stopped.
     ///
     /// # Errors
     /// Those of `check`.
@@ -58,32 +59,37 @@ impl Ground {
         lattice: MetricLattice,
         points: impl Iterator<Item = [i32; 3]> + Clone,
         sizes: GroundSizes,
+        most: u64,
         check: impl Fn() -> Result<(), E>,
-    ) -> Result<Ground, E> {
+    ) -> Result<Option<Ground>, E> {
         let mut area = CoveredArea::new(lattice);
         area.add(points.clone());
+        if area.cell_count().cells() > most {
+            return Ok(None);
+        }
         let mut lowest = LowestHeights::new(&area);
         lowest.add(points);
-        Ground::find(&lowest, sizes, check)
+        Ground::find(lowest, sizes, check).map(Some)
     }
 
     /// Finds the ground of the cloud with these lowest points. Calls `check` now and then, to be stopped.
     ///
     /// # Errors
     /// Those of `check`.
-    pub fn find<E>(lowest: &LowestHeights, sizes: GroundSizes, check: impl Fn() -> Result<(), E>) -> Result<Ground, E> {
+    pub fn find<E>(lowest: LowestHeights, sizes: GroundSizes, check: impl Fn() -> Result<(), E>) -> Result<Ground, E> {
         let (heights, base) = lowest.metres();
         let (spots, width) = (lowest.spots(), lowest.width());
+        let LowestHeights { lattice, squares, .. } = lowest;
+        drop(lowest);
         let cells = LowestCells { heights: &heights, spots: &spots, width };
         let GroundCells { surface, lowest: ground } = find_ground(cells, sizes, &check)?;
         check()?;
         drop(heights);
         let width = width as f32;
-        let planes = with_surroundings(&ground, &spots, &surface, (width, NOTHING.plane), |around, column, row| {
-            around.plane(column, row, true)
+        let cells = with_surroundings(&ground, &spots, &surface, (width, NOTHING), |around, column, row| GroundCell {
+            plane: around.plane(column, row, true),
+            lowest: around.own(column, row),
         });
-        let cells = planes.with(&ground, NOTHING, |plane, lowest| GroundCell { plane, lowest });
-        let LowestHeights { lattice, squares, .. } = *lowest;
         Ok(Ground { lattice, squares, base, tolerance: sizes.tolerance.0 as f32, cells })
     }
 
@@ -92,7 +98,16 @@ impl Ground {
         let MetricLattice { horizontal, vertical, offset } = self.lattice;
         // No number of steps is beyond 2^53.
         let [x, y] = offset.map(|offset| offset as f64);
-        let column = |of: fn(&GroundCell) -> f32| self.cells.values().flatten().map(of);
+        let columns: [fn(&GroundCell) -> f32; COLUMNS] = [
+            |cell| cell.plane.height,
+            |cell| cell.plane.slope[0],
+            |cell| cell.plane.slope[1],
+            |cell| cell.plane.spread,
+            |cell| cell.lowest,
+        ];
+        // Its length is known, so that it does not grow in memory.
+        let mut cells = Vec::with_capacity(COLUMNS * self.cells.places().len() * CELLS);
+        columns.into_iter().for_each(|column| cells.extend(self.cells.values().flatten().map(column)));
         GroundColumns {
             numbers: vec![
                 horizontal,
@@ -104,12 +119,7 @@ impl Ground {
                 self.tolerance.into(),
             ],
             places: self.cells.places().to_vec(),
-            cells: column(|cell| cell.plane.height)
-                .chain(column(|cell| cell.plane.slope[0]))
-                .chain(column(|cell| cell.plane.slope[1]))
-                .chain(column(|cell| cell.plane.spread))
-                .chain(column(|cell| cell.lowest))
-                .collect(),
+            cells,
         }
     }
 
@@ -122,13 +132,12 @@ impl Ground {
             let [height, right, up, spread, lowest] = [0, 1, 2, 3, 4].map(|column| cells[column * count + number]);
             GroundCell { plane: Plane { height, slope: [right, up], spread }, lowest }
         };
-        let all: Vec<GroundCell> = (0..count).map(cell).collect();
         Some(Ground {
             lattice,
             squares: lattice.cells(steps as i32),
             base: base as i32,
             tolerance: tolerance as f32,
-            cells: Cells::of_blocks(NOTHING, places, &all)?,
+            cells: Cells::of_blocks(NOTHING, places, count, cell)?,
         })
     }
 

@@ -15,6 +15,8 @@ const STRAIGHT: u8 = 10;
 const ACROSS: u8 = 7;
 /// A region is ground if so much of what goes on or falls off goes on: nine twentieths.
 const GOES_ON: [u64; 2] = [9, 20];
+/// A region may be as large as the cloud: after so many of its cells there is a check.
+const CELLS_BETWEEN_CHECKS: usize = 1 << 14;
 
 /// The border of a region at one of its cells.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,7 +47,7 @@ pub(crate) fn ground_regions<E>(
         for number in 0..SIDE * SIDE {
             let cell = [place[0] * SIDE + number % SIDE, place[1] * SIDE + number / SIDE];
             if unseen.at(cell) {
-                let (region, is_ground) = region_from(cell, &borders, &mut unseen);
+                let (region, is_ground) = region_from(cell, &borders, &mut unseen, check)?;
                 if !is_ground {
                     region.iter().for_each(|cell| set(&mut kept, *cell, false));
                 }
@@ -60,13 +62,24 @@ fn set(cells: &mut Cells<bool>, cell: Place, value: bool) {
     cells.block_mut(block)[number] = value;
 }
 
-/// Returns the cells of the region of `cell`, and tells whether it is ground. They are no longer `unseen` then.
-fn region_from(cell: Place, borders: &Cells<Border>, unseen: &mut Cells<bool>) -> (Vec<Place>, bool) {
+/// Returns the cells of the region of `cell`, and tells whether it is ground. They are no longer `unseen` then. Calls `check` now and then.
+///
+/// # Errors
+/// Those of `check`.
+fn region_from<E>(
+    cell: Place,
+    borders: &Cells<Border>,
+    unseen: &mut Cells<bool>,
+    check: &dyn Fn() -> Result<(), E>,
+) -> Result<(Vec<Place>, bool), E> {
     let (mut region, mut smooth, mut falls) = (vec![cell], 0u64, 0u64);
     set(unseen, cell, false);
     let mut next = 0;
     while let Some(&cell) = region.get(next) {
         next += 1;
+        if next % CELLS_BETWEEN_CHECKS == 0 {
+            check()?;
+        }
         let border = borders.at(cell);
         smooth += u64::from(border.smooth);
         falls += u64::from(border.falls);
@@ -79,7 +92,7 @@ fn region_from(cell: Place, borders: &Cells<Border>, unseen: &mut Cells<bool>) -
         }
     }
     let [part, whole] = GOES_ON;
-    (region, whole * smooth >= part * (smooth + falls))
+    Ok((region, whole * smooth >= part * (smooth + falls)))
 }
 
 /// Returns the borders of the regions of the cells that have come `back`, among those that were kept `before`.

@@ -91,7 +91,7 @@ fn found(points: &[Labelled]) -> Ground {
 
 fn found_on(lattice: MetricLattice, points: &[Labelled]) -> Ground {
     let points = points.iter().map(|(point, _)| *point);
-    Ground::of_points(lattice, points, GroundSizes::default(), || Ok::<_, ()>(())).unwrap()
+    Ground::of_points(lattice, points, GroundSizes::default(), u64::MAX, || Ok::<_, ()>(())).unwrap().unwrap()
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn the_ground_depends_on_the_points_alone() {
         in_pieces(&points, &mut area);
         let mut all = LowestHeights::new(&area);
         in_pieces(&points, &mut all);
-        let columns = Ground::find(&all, GroundSizes::default(), || Ok::<_, ()>(())).unwrap().to_columns();
+        let columns = Ground::find(all, GroundSizes::default(), || Ok::<_, ()>(())).unwrap().to_columns();
         assert_eq!((&columns.numbers, &columns.places), (&expected.numbers, &expected.places));
         let bits = |heights: &[f32]| heights.iter().map(|height| height.to_bits()).collect::<Vec<u32>>();
         assert!(bits(&columns.cells) == bits(&expected.cells));
