@@ -4,14 +4,14 @@ use crate::cells::{CELLS, Place, SIDE};
 use crate::density::CoveredArea;
 
 /// A block that touches fewer squares with points holds few of them: a full one has 64 or more.
-pub const FEW_SQUARES: u32 = 4;
+const FEW_SQUARES: u32 = 4;
 
 /// The cells that the ground of a cloud takes at most, in blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CellCount {
     /// The blocks.
     pub blocks: u64,
-    /// Those of them that hold few points: they touch fewer than [`FEW_SQUARES`] squares with points.
+    /// Those of them that hold few points: they touch fewer than four squares with points.
     pub lone: u64,
 }
 
@@ -26,8 +26,7 @@ impl CellCount {
         self.lone.saturating_mul(2) >= self.blocks
     }
 
-    /// Returns about how many blocks the ground of so many square metres takes, where points are so many metres apart. `step` is a lattice step in
-    /// metres.
+    /// Returns about how many blocks the ground of so many square metres takes, where points are so many metres apart.
     pub fn of_area(square_metres: f64, lattice: crate::MetricLattice, spacing: f64) -> CellCount {
         let side = f64::from(lattice.squares_for(spacing).steps) * f64::from(SIDE) * lattice.horizontal;
         // Along a line, blocks stick out by one in all.
@@ -43,7 +42,7 @@ impl CoveredArea {
     }
 
     /// As [`CoveredArea::cell_count`], for cells of points that are so many metres apart.
-    fn cell_count_for(&self, spacing: f64) -> CellCount {
+    pub fn cell_count_for(&self, spacing: f64) -> CellCount {
         let mut blocks: Vec<Place> = Vec::with_capacity(self.squares.len());
         for [[left, right], [bottom, top]] in self.touched_blocks(spacing) {
             blocks.extend((bottom..=top).flat_map(|row| (left..=right).map(move |column| [column, row])));

@@ -44,6 +44,11 @@ impl CoveredArea {
         self.squares.len() as u64
     }
 
+    /// Tells whether squares have several points on average, so that they show how far these are apart.
+    pub fn shows_density(&self) -> bool {
+        self.points as f64 >= ENOUGH * self.squares.len() as f64
+    }
+
     /// Returns how far apart points are, in metres.
     pub fn spacing(&self) -> f64 {
         let (mut wider, mut count) = (1, self.squares.len());

@@ -19,7 +19,7 @@ mod terrain;
 #[cfg(test)]
 mod tests;
 
-pub use cell_count::{CellCount, FEW_SQUARES};
+pub use cell_count::CellCount;
 pub use density::{CoveredArea, PointCollector};
 pub use ground::{BYTES_PER_CELL, Ground, GroundColumns};
 pub use lowest::LowestHeights;
