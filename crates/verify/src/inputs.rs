@@ -552,6 +552,7 @@ impl Differences<'_> {
         format!("{}, record {} of {}", self.text(point), point.order - before + 1, sources[index].path.display())
     }
 }
+
 /// Checks that three quarters of `memory` bytes hold the ground in so many cells: the rest is for what else the proof has in memory.
 fn require_memory_for_ground(cells: u64, memory: u64) -> Result<()> {
     let needed = cells.saturating_mul(BYTES_PER_CELL);
@@ -562,4 +563,19 @@ fn require_memory_for_ground(cells: u64, memory: u64) -> Result<()> {
     Err(Error::Memory(format!(
         "finding the ground of the inputs takes more memory than there is: set --memory \"{wanted} MiB\""
     )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memory_that_a_message_names_has_room_for_the_ground() {
+        for cells in [1, 4096, 4_000_000, 123_456_789] {
+            let why = require_memory_for_ground(cells, 10).unwrap_err().to_string();
+            let (_, after) = why.split_once("--memory \"").unwrap();
+            let wanted: u64 = after.split_once(" MiB").unwrap().0.parse().unwrap();
+            require_memory_for_ground(cells, wanted << 20).unwrap();
+        }
+    }
 }
