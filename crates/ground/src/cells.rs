@@ -36,13 +36,10 @@ impl<T: Copy + Send + Sync> Cells<T> {
         Cells { none, places, values, index }
     }
 
-    /// Returns the cells of the blocks at `places`, which ascend, with the `count` values that `of` gives for all of them; `None` if these are
-    /// more or fewer.
-    pub(crate) fn of_blocks(none: T, places: Vec<Place>, count: usize, of: impl Fn(usize) -> T) -> Option<Cells<T>> {
-        let block = |number: usize| (number * CELLS..(number + 1) * CELLS).map(&of).collect();
-        let values: Vec<Box<[T]>> = (0..count / CELLS).map(block).collect();
+    /// Returns the cells of the blocks at `places`, which ascend, with these values.
+    pub(crate) fn of_blocks(none: T, places: Vec<Place>, values: Vec<Box<[T]>>) -> Cells<T> {
         let index = places.iter().enumerate().map(|(number, place)| (*place, number)).collect();
-        (values.len() == places.len()).then_some(Cells { none, places, values, index })
+        Cells { none, places, values, index }
     }
 
     /// Returns the values of all blocks, in the order of their places.

@@ -21,7 +21,7 @@ mod tests;
 
 pub use cell_count::CellCount;
 pub use density::{CoveredArea, PointCollector};
-pub use ground::{BYTES_PER_CELL, Ground, GroundColumns};
+pub use ground::{BYTES_PER_CELL, CellNumbers, Ground, GroundColumns};
 pub use lowest::LowestHeights;
 pub use metric_lattice::MetricLattice;
 pub use sizes::GroundSizes;

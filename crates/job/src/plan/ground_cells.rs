@@ -224,7 +224,7 @@ mod tests {
     #[test]
     fn the_memory_that_a_message_names_has_room_for_the_ground() {
         let small = options(256 << 20);
-        for blocks in [800, 1_000, 12_345, 1_000_000] {
+        for blocks in [900, 1_000, 12_345, 1_000_000] {
             let count = CellCount { blocks, lone: 0 };
             let why = too_many_cells(&small, count).unwrap();
             assert!(!why.contains("far from") && too_many_cells(&options(limit_in(&why)), count).is_none(), "{why}");
