@@ -259,3 +259,30 @@ fn what_does_not_fit_is_refused() {
     let other = Job::on(&file).with("input.bare_earth", "slope = 0.2");
     other.run().refused(2, &["bare_earth", "surface = \"bare-earth\""]);
 }
+
+/// Each point far from all others has a block of cells to itself: that is known before the points are read.
+#[test]
+fn points_far_from_all_others_do_not_break_the_memory_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(8);
+    let mut points = village();
+    points.extend((0..1_000).map(|_| {
+        let [x, y] = [(); 2].map(|()| f64::from(u32::try_from(random.below(1 << 20)).unwrap()) / 10.0);
+        ([x, y, 40.0], true)
+    }));
+    let file = [write(folder.path(), "scattered.csv", &points)];
+    let limited = |memory: &str| bare_earth(&file).with("limits", &format!("memory = \"{memory}\""));
+    let words = [
+        "bare-earth",
+        "cells of ground",
+        "more than [limits] memory = \"128 MiB\"",
+        "points that lie far from all others",
+    ];
+    for arguments in [["check"].as_slice(), &[]] {
+        let said = limited("128 MiB").run_with(arguments);
+        said.refused(2, &words);
+        let (_, named) = said.err.rsplit_once("memory = \"").unwrap();
+        let (named, _) = named.split_once('"').unwrap();
+        limited(named).run_with(&["check"]).succeeded();
+    }
+}

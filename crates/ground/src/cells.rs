@@ -6,7 +6,7 @@ use std::collections::HashMap;
 /// The cells along a side of a block.
 pub(crate) const SIDE: i32 = 64;
 /// The cells of a block.
-const CELLS: usize = (SIDE * SIDE) as usize;
+pub(crate) const CELLS: usize = (SIDE * SIDE) as usize;
 
 /// The column and the row of a block, or of a cell.
 pub(crate) type Place = [i32; 2];
@@ -36,11 +36,10 @@ impl<T: Copy + Send + Sync> Cells<T> {
         Cells { none, places, values, index }
     }
 
-    /// Returns the cells of the blocks at `places`, which ascend, with the `values` of all of them; `None` if these are more or fewer.
-    pub(crate) fn of_blocks(none: T, places: Vec<Place>, values: &[T]) -> Option<Cells<T>> {
-        let values: Vec<Box<[T]>> = values.chunks_exact(CELLS).map(Box::from).collect();
+    /// Returns the cells of the blocks at `places`, which ascend, with these values.
+    pub(crate) fn of_blocks(none: T, places: Vec<Place>, values: Vec<Box<[T]>>) -> Cells<T> {
         let index = places.iter().enumerate().map(|(number, place)| (*place, number)).collect();
-        (values.len() == places.len()).then_some(Cells { none, places, values, index })
+        Cells { none, places, values, index }
     }
 
     /// Returns the values of all blocks, in the order of their places.

@@ -27,8 +27,8 @@ pub trait PointCollector: Sized + Send {
 #[derive(Clone, Debug)]
 pub struct CoveredArea {
     pub(crate) lattice: MetricLattice,
-    cells: SquareCells,
-    squares: HashSet<[i32; 2]>,
+    pub(crate) cells: SquareCells,
+    pub(crate) squares: HashSet<[i32; 2]>,
     points: u64,
 }
 
@@ -39,13 +39,26 @@ impl CoveredArea {
         CoveredArea { lattice, cells, squares: HashSet::new(), points: 0 }
     }
 
+    /// Returns how many squares hold points. Each is in memory, and the ground has no fewer cells.
+    pub fn squares(&self) -> u64 {
+        self.squares.len() as u64
+    }
+
+    /// Tells whether squares have several points on average, so that they show how far these are apart.
+    pub fn shows_density(&self) -> bool {
+        self.points as f64 >= ENOUGH * self.squares.len() as f64
+    }
+
     /// Returns how far apart points are, in metres.
-    pub(crate) fn spacing(&self) -> f64 {
+    pub fn spacing(&self) -> f64 {
         let (mut wider, mut count) = (1, self.squares.len());
+        let mut wide: Vec<[i32; 2]> = Vec::new();
         while (self.points as f64) < ENOUGH * count as f64 && wider < WIDEST {
             wider *= 2;
-            let wide: HashSet<[i32; 2]> =
-                self.squares.iter().map(|square| square.map(|at| at.div_euclid(wider))).collect();
+            wide.clear();
+            wide.extend(self.squares.iter().map(|square| square.map(|at| at.div_euclid(wider))));
+            wide.sort_unstable();
+            wide.dedup();
             count = wide.len();
         }
         let side = f64::from(self.cells.steps) * f64::from(wider) * self.lattice.horizontal;

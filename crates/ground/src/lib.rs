@@ -2,6 +2,7 @@
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
+mod cell_count;
 mod cells;
 mod density;
 mod fill;
@@ -19,8 +20,9 @@ mod terrain;
 #[cfg(test)]
 mod tests;
 
+pub use cell_count::CellCount;
 pub use density::{CoveredArea, PointCollector};
-pub use ground::{BYTES_PER_CELL, Ground, GroundColumns};
+pub use ground::{BYTES_PER_CELL, CellNumbers, Ground, GroundColumns};
 pub use lowest::LowestHeights;
 pub use metric_lattice::MetricLattice;
 pub use sizes::GroundSizes;

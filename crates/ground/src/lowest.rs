@@ -5,10 +5,6 @@ use crate::density::{CoveredArea, PointCollector};
 use crate::metric_lattice::{MetricLattice, SquareCells};
 use crate::morphology::EMPTY;
 
-/// The least width of a cell in metres.
-const LEAST_WIDTH: f64 = 1.0;
-/// A cell is this many times as wide as points are apart, or wider.
-const SPACINGS: f64 = 0.75;
 /// The lowest point of a cell. Of points at one height, the one with the least place is lower.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct LowestPoint {
@@ -31,8 +27,11 @@ pub struct LowestHeights {
 impl LowestHeights {
     /// Returns cells without points for the cloud that covers this area.
     pub fn new(area: &CoveredArea) -> LowestHeights {
-        let steps = area.lattice.steps_of(LEAST_WIDTH.max(SPACINGS * area.spacing()));
-        LowestHeights { lattice: area.lattice, squares: area.lattice.cells(steps), cells: Cells::new(NONE) }
+        LowestHeights {
+            lattice: area.lattice,
+            squares: area.lattice.squares_for(area.spacing()),
+            cells: Cells::new(NONE),
+        }
     }
 
     /// Returns the number of cells that take memory.

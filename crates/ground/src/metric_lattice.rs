@@ -2,6 +2,11 @@
 
 use crate::cells::Place;
 
+/// The least width of a cell in metres.
+const LEAST_WIDTH: f64 = 1.0;
+/// A cell is this many times as wide as points are apart, or wider.
+const SPACINGS: f64 = 0.75;
+
 /// The lattice that points have integers on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetricLattice {
@@ -18,6 +23,11 @@ impl MetricLattice {
     /// Returns a length in lattice steps, rounded up.
     pub(crate) fn steps_of(self, metres: f64) -> i32 {
         (metres / self.horizontal).ceil().clamp(1.0, f64::from(1 << 28)) as i32
+    }
+
+    /// Returns the cells for points that are so far apart, in metres.
+    pub(crate) fn squares_for(self, spacing: f64) -> SquareCells {
+        self.cells(self.steps_of(LEAST_WIDTH.max(SPACINGS * spacing)))
     }
 
     /// Returns the cells of this width in steps, at most 2^28. Cell (0, 0) begins at zero of the source coordinates, or so many cells from there
@@ -49,6 +59,18 @@ impl SquareCells {
     /// Returns the column and the row of the cell that a place on the lattice is in.
     pub(crate) fn of(self, place: [i32; 2]) -> Place {
         [0, 1].map(|axis| (place[axis] + self.rest[axis]).div_euclid(self.steps) + self.first[axis])
+    }
+
+    /// Returns the first and the last step of a column of cells, or of a row, on an axis of the lattice.
+    pub(crate) fn span(self, axis: usize, number: i32) -> [i64; 2] {
+        let first =
+            (i64::from(number) - i64::from(self.first[axis])) * i64::from(self.steps) - i64::from(self.rest[axis]);
+        [first, first + i64::from(self.steps) - 1]
+    }
+
+    /// Returns the column or the row of cells that a step on an axis of the lattice is in.
+    pub(crate) fn number_at(self, axis: usize, step: i64) -> i64 {
+        (step + i64::from(self.rest[axis])).div_euclid(i64::from(self.steps)) + i64::from(self.first[axis])
     }
 
     /// Returns how many steps from the beginning of its cell a place is.

@@ -62,6 +62,11 @@ impl Surroundings<'_> {
         self.spots.at(column, row)
     }
 
+    /// Returns the height of the ground in a cell of the block.
+    pub(crate) fn own(&self, column: i32, row: i32) -> f32 {
+        self.ground.at(column, row)
+    }
+
     /// Returns the plane for a cell of the block, with the ground of the cell itself or without.
     pub(crate) fn plane(&self, column: i32, row: i32, with_own: bool) -> Plane {
         let base = self.surface[(row * SIDE + column) as usize];

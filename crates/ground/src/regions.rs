@@ -23,6 +23,9 @@ pub(crate) struct RegionRule {
     pub(crate) looks_beyond: bool,
 }
 
+/// A region may be as large as the cloud: after so many of its cells there is a check.
+const CELLS_BETWEEN_CHECKS: usize = 1 << 14;
+
 /// The border of a region at one of its cells.
 #[derive(Clone, Copy, Debug, Default)]
 struct Border {
@@ -54,7 +57,7 @@ pub(crate) fn ground_regions<E>(
         for number in 0..SIDE * SIDE {
             let cell = [place[0] * SIDE + number % SIDE, place[1] * SIDE + number / SIDE];
             if unseen.at(cell) {
-                let (region, is_ground) = region_from(cell, &borders, &mut unseen, rule);
+                let (region, is_ground) = region_from(cell, &borders, &mut unseen, rule, check)?;
                 if !is_ground {
                     region.iter().for_each(|cell| set(&mut kept, *cell, false));
                 }
@@ -69,18 +72,25 @@ fn set(cells: &mut Cells<bool>, cell: Place, value: bool) {
     cells.block_mut(block)[number] = value;
 }
 
-/// Returns the cells of the region of `cell`, and tells whether it is ground. They are no longer `unseen` then.
-fn region_from(
+/// Returns the cells of the region of `cell`, and tells whether it is ground. They are no longer `unseen` then. Calls `check` now and then.
+///
+/// # Errors
+/// Those of `check`.
+fn region_from<E>(
     cell: Place,
     borders: &Cells<Border>,
     unseen: &mut Cells<bool>,
     RegionRule { goes_on: [part, whole], .. }: RegionRule,
-) -> (Vec<Place>, bool) {
+    check: &dyn Fn() -> Result<(), E>,
+) -> Result<(Vec<Place>, bool), E> {
     let (mut region, mut smooth, mut falls) = (vec![cell], 0u64, 0u64);
     set(unseen, cell, false);
     let mut next = 0;
     while let Some(&cell) = region.get(next) {
         next += 1;
+        if next % CELLS_BETWEEN_CHECKS == 0 {
+            check()?;
+        }
         let border = borders.at(cell);
         smooth += u64::from(border.smooth);
         falls += u64::from(border.falls);
@@ -92,7 +102,7 @@ fn region_from(
             }
         }
     }
-    (region, whole * smooth >= part * (smooth + falls))
+    Ok((region, whole * smooth >= part * (smooth + falls)))
 }
 
 /// Returns the borders of the regions of the `doubtful` cells, among the `sure` ones.

@@ -1,6 +1,6 @@
 //! Made-up scenes whose ground is known.
 
-use crate::{CoveredArea, Ground, GroundSizes, LowestHeights, MetricLattice, PointCollector};
+use crate::{CellNumbers, CoveredArea, Ground, GroundSizes, LowestHeights, MetricLattice, PointCollector};
 
 /// Centimetres.
 const SCALE: MetricLattice = MetricLattice { horizontal: 0.01, vertical: 0.01, offset: [0; 2] };
@@ -91,7 +91,7 @@ fn found(points: &[Labelled]) -> Ground {
 
 fn found_on(lattice: MetricLattice, points: &[Labelled]) -> Ground {
     let points = points.iter().map(|(point, _)| *point);
-    Ground::of_points(lattice, points, GroundSizes::default(), || Ok::<_, ()>(())).unwrap()
+    Ground::of_points(lattice, points, GroundSizes::default(), u64::MAX, || Ok::<_, ()>(())).unwrap().unwrap()
 }
 
 #[test]
@@ -178,14 +178,18 @@ fn in_pieces<C: PointCollector>(points: &[Labelled], all: &mut C) {
 fn the_ground_depends_on_the_points_alone() {
     for seed in 300..306 {
         let points = scene(seed);
-        let expected = found(&points).to_columns();
+        let known = found(&points);
+        let expected = known.columns();
         let mut area = CoveredArea::new(SCALE);
         in_pieces(&points, &mut area);
         let mut all = LowestHeights::new(&area);
         in_pieces(&points, &mut all);
-        let columns = Ground::find(&all, GroundSizes::default(), || Ok::<_, ()>(())).unwrap().to_columns();
+        let ground = Ground::find(all, GroundSizes::default(), || Ok::<_, ()>(())).unwrap();
+        let columns = ground.columns();
         assert_eq!((&columns.numbers, &columns.places), (&expected.numbers, &expected.places));
-        let bits = |heights: &[f32]| heights.iter().map(|height| height.to_bits()).collect::<Vec<u32>>();
+        let bits = |cells: &[&[CellNumbers]]| {
+            cells.iter().flat_map(|cells| cells.as_flattened()).map(|number| number.to_bits()).collect::<Vec<u32>>()
+        };
         assert!(bits(&columns.cells) == bits(&expected.cells));
     }
 }
@@ -210,11 +214,15 @@ fn the_ground_is_the_same_on_every_lattice() {
 fn the_ground_can_be_stored() {
     let points = scene(400);
     let ground = found(&points);
-    let again = Ground::of_columns(ground.to_columns()).unwrap();
+    let columns = ground.columns();
+    let cells = columns.cells.concat();
+    let read = |cells: &[CellNumbers]| {
+        let part = |range: std::ops::Range<usize>| Ok::<_, ()>(cells[range.start..range.end.min(cells.len())].to_vec());
+        Ground::of_columns(columns.numbers.clone(), columns.places.to_vec(), part).unwrap()
+    };
+    let again = read(&cells).unwrap();
     assert!(points.iter().all(|(point, _)| ground.has(*point) == again.has(*point)));
-    let mut columns = ground.to_columns();
-    columns.cells.pop();
-    assert!(Ground::of_columns(columns).is_none());
+    assert!(read(&cells[1..]).is_none());
 }
 
 /// Clouds that are hardly any.

@@ -109,10 +109,14 @@ fn time_to_wait(written: SystemTime, now: SystemTime) -> Duration {
     }
 }
 
-/// Returns the milliseconds since 1970. Finer fractions get lost on the way to other file systems.
+/// Returns the milliseconds since 1970; of earlier times, counted down from the greatest number. Finer fractions get lost on the way to other file
+/// systems.
 fn milliseconds(time: SystemTime) -> u64 {
-    let since = time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    u64::try_from(since.as_millis()).unwrap_or(u64::MAX)
+    let whole = |duration: Duration| u64::try_from(duration.as_millis()).unwrap_or(u64::MAX);
+    match time.duration_since(SystemTime::UNIX_EPOCH) {
+        Ok(since) => whole(since),
+        Err(before) => u64::MAX - whole(before.duration()),
+    }
 }
 
 /// As [`files_beside`], once another change of a file would give another time.

@@ -15,7 +15,7 @@ use crate::report::ReportedFacts;
 use crate::surface::{Bound, Surface, SurfaceProof};
 use crate::watcher::Watcher;
 use delaunay::geometry::Site;
-use ground::{CoveredArea, Ground, LowestHeights, MetricLattice, PointCollector};
+use ground::{BYTES_PER_CELL, CoveredArea, Ground, LowestHeights, MetricLattice, PointCollector};
 use lattice::{AxisMap, Lattice, shortest_decimal};
 use points::options::{Duplicates, InputOptions};
 use points::samples::{FileSamples, fingerprint_of};
@@ -105,6 +105,8 @@ pub(super) struct Inputs<'a> {
     files: &'a [PathBuf],
     /// The area that the job kept points in; `None` for everywhere.
     clip: Option<ClipArea>,
+    /// The bytes of memory that the proof may take.
+    memory: u64,
     watcher: &'a dyn Watcher,
 }
 
@@ -117,6 +119,7 @@ impl<'a> Inputs<'a> {
         files: &'a [PathBuf],
         facts: &'a ReportedFacts,
         extras: &Extras,
+        memory: u64,
         watcher: &'a dyn Watcher,
     ) -> Result<Inputs<'a>> {
         let reading = facts.texts.unwrap_or(TextReading { colors: true, ..TextReading::default() });
@@ -158,7 +161,7 @@ impl<'a> Inputs<'a> {
             offset: lattice.steps_from_zero(),
         };
         let clip = clip_area(facts, &lattice)?;
-        Ok(Inputs { facts, lattice, metric, sources, files, clip, watcher })
+        Ok(Inputs { facts, lattice, metric, sources, files, clip, memory, watcher })
     }
 
     /// Compares the vertices in `places` with the points of the inputs, and with the ends of the edges along breaklines. Points that are no
@@ -229,13 +232,19 @@ impl<'a> Inputs<'a> {
     }
 
     /// Finds the ground anew, as the job did.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] if the memory does not hold it, and those of reading the inputs.
     fn find_ground(&self) -> Result<Ground> {
         self.begin("find area");
         let area = self.collect(CoveredArea::new(self.metric))?;
+        require_memory_for_ground(area.cell_count().cells(), self.memory)?;
         self.begin("find ground");
-        let lowest = self.collect(LowestHeights::new(&area))?;
+        let lowest = LowestHeights::new(&area);
+        drop(area);
+        let lowest = self.collect(lowest)?;
         let sizes = self.facts.input.as_ref().map(|input| input.bare_earth).unwrap_or_default();
-        Ground::find(&lowest, sizes, interrupt::check)
+        Ground::find(lowest, sizes, interrupt::check)
     }
 
     /// Adds all points that the job wanted to `collector`.
@@ -541,5 +550,32 @@ impl Differences<'_> {
         let index = point.source as usize - 1;
         let before: u64 = sources[..index].iter().map(|source| source.records).sum();
         format!("{}, record {} of {}", self.text(point), point.order - before + 1, sources[index].path.display())
+    }
+}
+
+/// Checks that three quarters of `memory` bytes hold the ground in so many cells: the rest is for what else the proof has in memory.
+fn require_memory_for_ground(cells: u64, memory: u64) -> Result<()> {
+    let needed = cells.saturating_mul(BYTES_PER_CELL);
+    if needed <= memory / 4 * 3 {
+        return Ok(());
+    }
+    let wanted = (needed.div_ceil(3).saturating_mul(4) >> 20) + 1;
+    Err(Error::Memory(format!(
+        "finding the ground of the inputs takes more memory than there is: set --memory \"{wanted} MiB\""
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memory_that_a_message_names_has_room_for_the_ground() {
+        for cells in [1, 4096, 4_000_000, 123_456_789] {
+            let why = require_memory_for_ground(cells, 10).unwrap_err().to_string();
+            let (_, after) = why.split_once("--memory \"").unwrap();
+            let wanted: u64 = after.split_once(" MiB").unwrap().0.parse().unwrap();
+            require_memory_for_ground(cells, wanted << 20).unwrap();
+        }
     }
 }

@@ -176,7 +176,7 @@ pub fn verify_watched(directory: &Path, memory: u64, inputs: &[PathBuf], watcher
     };
     let inputs = match inputs {
         [] => None,
-        inputs => Some(Inputs::open(inputs, &report.facts, &files.extras, watcher)?),
+        inputs => Some(Inputs::open(inputs, &report.facts, &files.extras, memory, watcher)?),
     };
     let lattice = || lattice_of(&report.facts, &files.extras);
     let lines = BreaklineEdges::read(directory, lattice, memory / 4)?;

@@ -14,14 +14,20 @@ const ALIGNMENT: usize = size_of::<u128>();
 /// Collects columns and writes them as one record.
 #[derive(Default)]
 pub struct ColumnWriter<'a> {
-    /// The number of values of each column, and their bytes.
-    columns: Vec<([u8; ALIGNMENT], &'a [u8])>,
+    /// The number of values of each column, and their bytes in parts.
+    columns: Vec<([u8; ALIGNMENT], Vec<&'a [u8]>)>,
 }
 
 impl<'a> ColumnWriter<'a> {
     /// Adds a column.
-    pub fn push<T: Pod>(mut self, column: &'a [T]) -> ColumnWriter<'a> {
-        self.columns.push(((column.len() as u128).to_ne_bytes(), bytemuck::cast_slice(column)));
+    pub fn push<T: Pod>(self, column: &'a [T]) -> ColumnWriter<'a> {
+        self.push_parts(&[column])
+    }
+
+    /// Adds a column whose values lie in several places of memory.
+    pub fn push_parts<T: Pod>(mut self, parts: &[&'a [T]]) -> ColumnWriter<'a> {
+        let count: u128 = parts.iter().map(|part| part.len() as u128).sum();
+        self.columns.push((count.to_ne_bytes(), parts.iter().map(|part| bytemuck::cast_slice(part)).collect()));
         self
     }
 
@@ -30,9 +36,14 @@ impl<'a> ColumnWriter<'a> {
     /// # Errors
     /// [`Error::Io`] if writing fails.
     pub fn write<K: RecordKey>(self, store: &Store<K>, key: K) -> Result<()> {
-        let padding = |bytes: &[u8]| &[0; ALIGNMENT][..bytes.len().next_multiple_of(ALIGNMENT) - bytes.len()];
-        let pieces = self.columns.iter().flat_map(|(length, bytes)| [&length[..], bytes, padding(bytes)]);
-        store.put(key, &pieces.collect::<Vec<&[u8]>>())
+        let mut pieces: Vec<&[u8]> = Vec::new();
+        for (length, parts) in &self.columns {
+            let bytes: usize = parts.iter().map(|part| part.len()).sum();
+            pieces.push(length);
+            pieces.extend(parts);
+            pieces.push(&[0; ALIGNMENT][..bytes.next_multiple_of(ALIGNMENT) - bytes]);
+        }
+        store.put(key, &pieces)
     }
 }
 

@@ -13,13 +13,14 @@ use crate::partition::parts::Parts;
 use crate::partition::point_file::{PointFile, PointFiles};
 use crate::partition::result::Partition;
 use crate::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory, working_memory};
+use crate::plan::ground_cells::{too_many_cells, too_many_squares};
 use crate::plan::job_plan::Plan;
 use crate::progress::number_text::grouped;
 use crate::{Error, Result};
 use delaunay::geometry::Site;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay_gpu::triangulator::Triangulator;
-use ground::{BYTES_PER_CELL, CoveredArea, Ground, LowestHeights, MetricLattice, PointCollector};
+use ground::{CoveredArea, Ground, LowestHeights, MetricLattice, PointCollector};
 use points::Point;
 use rayon::prelude::*;
 use rust_decimal::Decimal;
@@ -104,19 +105,6 @@ pub(crate) fn metric_lattice(plan: &Plan) -> MetricLattice {
     MetricLattice { horizontal, vertical, offset: plan.lattice.steps_from_zero() }
 }
 
-/// Returns what is wrong if the memory has no room for the heights of so many cells.
-fn too_many_cells(options: &JobOptions, cells: u64) -> Option<String> {
-    let has_room = cells.saturating_mul(BYTES_PER_CELL) <= working_memory(options);
-    (!has_room).then(|| {
-        format!(
-            "surface = \"bare-earth\" needs memory for at least {} cells of the ground, more than [limits] memory = \"{}\" allows; fix: \
-             more [limits] memory, or [input] bounds without points that lie far from all others",
-            grouped(cells),
-            options.limits.memory
-        )
-    })
-}
-
 /// A part whose points have all been read, cut into blocks.
 pub(crate) struct PartInBlocks {
     pub(crate) part: PartIndex,
@@ -161,13 +149,17 @@ impl<'a> PointsInBlocks<'a> {
     /// # Errors
     /// [`sys::Error::Io`] on point files; [`sys::Error::Config`] if the memory does not hold the heights of all cells.
     pub(crate) fn on_found_ground(mut self, advance: impl Fn(u64) + Sync) -> Result<PointsInBlocks<'a>> {
-        let area = self.collect(&CoveredArea::new(metric_lattice(self.plan)), &|_| None)?;
-        let refusal = |lowest: &LowestHeights| too_many_cells(&self.plan.options, lowest.cells());
-        let lowest = self.collect(&LowestHeights::new(&area), &refusal)?;
+        let (options, known) = (&self.plan.options, self.plan.ground_cells);
+        let area = CoveredArea::new(metric_lattice(self.plan));
+        let area = self.collect(&area, &|area| too_many_squares(options, area, known))?;
+        too_many_cells(options, area.cell_count()).map_or(Ok(()), |why| Err(sys::Error::Config(why)))?;
+        let lowest = LowestHeights::new(&area);
+        drop(area);
+        let lowest = self.collect(&lowest, &|_| None)?;
         let points: u64 = self.parts.iter().map(|part| part.partition.kept).sum();
         advance(points / 2);
         fault::point("ground");
-        self.ground = Some(Ground::find(&lowest, self.plan.options.input.bare_earth, interrupt::check)?);
+        self.ground = Some(Ground::find(lowest, self.plan.options.input.bare_earth, interrupt::check)?);
         advance(points - points / 2);
         Ok(self)
     }

@@ -49,7 +49,7 @@ pub fn merge_memory(options: &JobOptions, is_root: bool, threads: usize) -> u64 
 }
 
 /// Returns the least `[limits] memory`, as a user writes it, of which the part for work is at least `working` bytes.
-fn limit_for(working: u64) -> String {
+pub(crate) fn limit_for(working: u64) -> String {
     // Messages name whole steps.
     const STEP: u64 = 64 << 20;
     let limit = working.div_ceil(3).saturating_mul(4).div_ceil(STEP).saturating_mul(STEP);

@@ -3,6 +3,7 @@
 //! One point of noise, or a header with a wrong greatest height, must not give all of a terrain one colour. So a sample of the points
 //! decides. It is the same for a job of one part and of several, whose tiles are coloured before the last point is read.
 
+use crate::plan::ground_cells::MOST_SAMPLE_CELLS;
 use crate::plan::height_groups::{HeightBins, HeightGroup};
 use delaunay::geometry::{Bounds, Site, bounds_of};
 use ground::{Ground, GroundSizes, MetricLattice};
@@ -18,6 +19,9 @@ const MOST_CHUNKS: usize = 128;
 
 /// The records at which the sample looks, in all chunks together: half a percent of the reading of ten million.
 const RECORDS: u64 = 1 << 16;
+
+/// The records at which it looks in a chunk, where there are many.
+const POINTS_OF_PLACE: usize = RECORDS as usize / MOST_CHUNKS;
 
 /// Where an index lists the chunks within bounds, they are few, and the sample would read much of them. A share of them is enough.
 const SHARE_OF_LISTED: usize = 4;
@@ -133,6 +137,11 @@ impl HeightSample {
         (low == high).then_some(low)
     }
 
+    /// Returns the number of records at which it has looked.
+    pub(crate) fn seen(&self) -> u64 {
+        self.seen
+    }
+
     /// Returns whether it has looked at all records.
     pub(crate) fn saw_all(&self) -> bool {
         self.seen >= self.records
@@ -158,15 +167,22 @@ impl HeightSample {
         (count >= LEAST_POINTS).then(|| length(0).max(length(1)))
     }
 
-    /// Returns the sample with the heights of those points alone that lie on the ground, as far as the sample shows it. All stay if none does.
+    /// Returns the sample with the heights of those points alone that lie on the ground, as far as the sample shows it. All stay if none does. Where
+    /// the ground of the sample has too many cells, that of a part of it decides: points far from all others take as many as a place full of points.
     ///
     /// # Errors
     /// [`sys::Error::Interrupted`].
     pub(crate) fn on_ground(self, lattice: MetricLattice, sizes: GroundSizes) -> Result<HeightSample> {
         let corners = || self.points.iter().map(|([x, y], z)| [*x, *y, *z]);
-        let ground = Ground::of_points(lattice, corners(), sizes, interrupt::check)?;
-        let mut heights: Vec<i32> =
-            corners().filter(|corner| ground.has(*corner)).map(|[_, _, height]| height).collect();
+        let mut heights = Vec::new();
+        for every in (0..=MOST_CHUNKS.ilog2()).map(|power| 1 << power) {
+            let is_in = |number: usize| number / POINTS_OF_PLACE % every == 0;
+            let some = || corners().enumerate().filter(|(number, _)| is_in(*number)).map(|(_, corner)| corner);
+            if let Some(ground) = Ground::of_points(lattice, some(), sizes, MOST_SAMPLE_CELLS, interrupt::check)? {
+                heights.extend(corners().filter(|corner| ground.has(*corner)).map(|[_, _, height]| height));
+                break;
+            }
+        }
         heights.sort_unstable();
         Ok(if heights.is_empty() { self } else { HeightSample { heights, ..self } })
     }

@@ -5,6 +5,7 @@ use crate::index::PartIndex;
 use crate::options::JobOptions;
 use crate::plan::breaklines::PlannedBreaklines;
 use crate::plan::clip::PlannedClip;
+use crate::plan::ground_cells::GroundCells;
 use crate::plan::ground_triangles::GroundTriangles;
 use crate::plan::input_identity::RenamedInputs;
 use crate::plan::lattice_choice::LatticeCoarsening;
@@ -76,6 +77,9 @@ pub struct Plan {
     /// A sentence about a few points that stretch the area, if there are some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stretch: Option<String>,
+    /// With `surface = "bare-earth"`: how many cells the ground has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) ground_cells: Option<GroundCells>,
     /// With `max_error`: which long triangles lie on ground.
     #[serde(skip)]
     pub on_ground: GroundTriangles,

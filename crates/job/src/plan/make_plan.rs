@@ -12,6 +12,7 @@ use crate::plan::extent::{Extent, SourceBox, to_float};
 use crate::plan::far_points::{extent_without_outliers, farthest_file};
 use crate::plan::flat_points::flat_points;
 use crate::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of_geocentric};
+use crate::plan::ground_cells::{GroundCells, KnownCloud};
 use crate::plan::ground_triangles::GroundTriangles;
 use crate::plan::height_range::HeightSample;
 use crate::plan::inputs::{check_missing_records, named_inputs, open_all};
@@ -255,11 +256,18 @@ fn try_plan(
     let [low, high] = claimed_heights(&lattice, &extent).map(|z| z.round() as i32);
     let [horizontal, vertical] = frame.resolution_metres();
     let metric = MetricLattice { horizontal, vertical, offset: lattice.steps_from_zero() };
-    let sample =
-        if options.input.finds_ground() { sample.on_ground(metric, options.input.bare_earth)? } else { sample };
+    let (sample, ground_cells) = match options.input.finds_ground() {
+        true => {
+            let cells = known_cells(&sample, metric, decoded, &claimed, clipped);
+            cells.too_many(options).map_or(Ok(()), |why| Err(Error::Config(why)))?;
+            (sample.on_ground(metric, options.input.bare_earth)?, Some(cells))
+        }
+        false => (sample, None),
+    };
     let heights = sample.range_within(HeightRange { low, high });
     let plan = Plan {
         claims,
+        ground_cells,
         on_ground: GroundTriangles::default(),
         options: options.clone(),
         inputs: Vec::new(),
@@ -398,6 +406,25 @@ fn lattice_clip(lattice: &Lattice, bounds: [f64; 4]) -> Bounds<2> {
         steps.unwrap_or(far).clamp(-(REACH as i64), REACH as i64) as i32
     });
     Bounds { min: [xmin, ymin], max: [xmax, ymax] }
+}
+
+/// Returns what is known of the cells of the ground: by a sample of the `records`, and the boxes that inputs have claimed within the `extent`.
+fn known_cells(
+    sample: &HeightSample,
+    lattice: MetricLattice,
+    records: u64,
+    claimed: &[Bounds<2>],
+    extent: Bounds<2>,
+) -> GroundCells {
+    let area = |bounds: &Bounds<2>| bounds.extent(0) as f64 * bounds.extent(1) as f64;
+    let square_steps = claimed.iter().map(area).sum::<f64>().min(area(&extent));
+    GroundCells::of(KnownCloud {
+        lattice,
+        square_metres: square_steps * lattice.horizontal * lattice.horizontal,
+        records,
+        seen: sample.seen(),
+        sample: &mut sample.points.iter().map(|([x, y], z)| [*x, *y, *z]),
+    })
 }
 
 /// Returns the area of the box around all records in square lattice steps, whatever part of it the user wants.

@@ -17,6 +17,7 @@ pub(crate) mod flat_points;
 pub mod folder_files;
 pub(crate) mod geocentric_inputs;
 pub(crate) mod globe_system;
+pub mod ground_cells;
 pub mod ground_triangles;
 mod height_groups;
 pub(crate) mod height_range;

@@ -5,6 +5,7 @@
 //! in the same way up to the density of all points.
 
 use crate::mesh::selection::{error_bound, metric_lattice};
+use crate::plan::budget::working_memory;
 use crate::plan::job_plan::Plan;
 use crate::preflight::kept_points::KeptPoints;
 use crate::preflight::sampled_points::sampled_points;
@@ -13,7 +14,7 @@ use crate::progress::number_text::{grouped, mebibytes, rough};
 use crate::publish::contours::check::TerrainLevels;
 use delaunay::geometry::Site;
 use delaunay::triangulation::canonical;
-use ground::Ground;
+use ground::{BYTES_PER_CELL, Ground};
 use points::surface::{MeshOf, Surface};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -214,11 +215,15 @@ fn config_error(error: crate::Error) -> Error {
     Error::Config(error.to_string())
 }
 
-/// Returns those of some points that are on the ground, as far as these points alone tell.
+/// Returns those of some points that are on the ground, as far as these points alone tell. All stay where their ground takes too much memory.
 fn on_ground(plan: &Plan, mut points: Vec<[i32; 3]>) -> Result<Vec<[i32; 3]>> {
     let sizes = plan.options.input.bare_earth;
-    let ground = Ground::of_points(metric_lattice(plan), points.iter().copied(), sizes, interrupt::check)?;
-    points.retain(|point| ground.has(*point));
+    let most = working_memory(&plan.options) / BYTES_PER_CELL / rayon::current_num_threads() as u64;
+    if let Some(ground) =
+        Ground::of_points(metric_lattice(plan), points.iter().copied(), sizes, most, interrupt::check)?
+    {
+        points.retain(|point| ground.has(*point));
+    }
     Ok(points)
 }
 

@@ -244,6 +244,7 @@ pub(crate) fn memory(plan: &Plan, kept: KeptPoints, threads: usize) -> u64 {
             .max(map_tile_memory(plan, threads))
             .max(contour_memory(plan, threads))
             .max(terrain_memory(plan, threads))
+            .max(plan.ground_cells.map_or(0, |cells| cells.bytes(options)))
 }
 
 fn level_memory(options: &JobOptions, points: u64, threads: usize) -> u64 {

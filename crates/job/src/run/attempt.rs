@@ -211,6 +211,7 @@ fn attempt(
     let progress = &JobProgress::new(run.progress, clock, stage_costs(&plan, contours_of_all.as_ref()));
     note_skipped(&plan.skipped, progress);
     contours_of_all.and_then(|contours| contours.warning(&plan)).iter().for_each(|warning| progress.note(warning));
+    plan.ground_cells.and_then(|cells| cells.warning(options)).iter().for_each(|warning| progress.note(warning));
     if !run.force && !is_by_tasks && !is_update {
         on_threads(threads, || require_memory_and_disk(&plan, threads, contours.as_ref()))?;
     }

@@ -18,10 +18,11 @@ use crate::run::part_entries::{entries_of, entry_of, open_store};
 use crate::run::phases::read_phase::{listed_points_of, points_of};
 use crate::{Error, Result};
 use delaunay::geometry::Site;
-use ground::{Ground, GroundColumns};
+use ground::{CellNumbers, Ground, GroundColumns};
 use selection::{Figures, Selection, select};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// What is known of a part once its vertices are selected.
@@ -100,8 +101,8 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
         blocks.save_as(&folder.store, StepRecord::Selected)?;
         if number == 0 {
             ColumnWriter::default().push(&on_ground).write(&folder.store, StepRecord::OnGround)?;
-            if let Some(GroundColumns { numbers, places, cells }) = source.ground().map(Ground::to_columns) {
-                let columns = ColumnWriter::default().push(&numbers).push(&places).push(&cells);
+            if let Some(GroundColumns { numbers, places, cells }) = source.ground().map(Ground::columns) {
+                let columns = ColumnWriter::default().push(&numbers).push(places).push_parts(&cells);
                 columns.write(&folder.store, StepRecord::Ground)?;
             }
         }
@@ -150,9 +151,14 @@ pub(crate) fn found_ground(job: &Job) -> sys::Result<Ground> {
     let entries = entries_of(&directory, job.header(PartIndex::FIRST))?;
     let store = open_store(&directory, records_of(&entries).into_values())?;
     let mut columns = ColumnReader::open(&store, StepRecord::Ground)?;
-    let ground =
-        GroundColumns { numbers: columns.column_vec()?, places: columns.column_vec()?, cells: columns.column_vec()? };
-    Ground::of_columns(ground).ok_or_else(|| sys::Error::Broken("the ground has no cells".into()))
+    let (numbers, places) = (columns.column_vec()?, columns.column_vec()?);
+    let read = |range: Range<usize>| {
+        let mut columns = ColumnReader::open(&store, StepRecord::Ground)?;
+        columns.skip_column::<f64>()?;
+        columns.skip_column::<[i32; 2]>()?;
+        columns.column_part::<CellNumbers>(range.start, range.len())
+    };
+    Ground::of_columns(numbers, places, read)?.ok_or_else(|| sys::Error::Broken("the ground has no cells".into()))
 }
 
 /// Returns a hash of the rule by which triangles along the hull may be slivers.
