@@ -176,7 +176,7 @@ impl HeightSample {
         let corners = || self.points.iter().map(|([x, y], z)| [*x, *y, *z]);
         let mut heights = Vec::new();
         for every in (0..=MOST_CHUNKS.ilog2()).map(|power| 1 << power) {
-            let is_in = |number: usize| number / POINTS_OF_PLACE % every == 0;
+            let is_in = |number: usize| (number / POINTS_OF_PLACE).is_multiple_of(every);
             let some = || corners().enumerate().filter(|(number, _)| is_in(*number)).map(|(_, corner)| corner);
             if let Some(ground) = Ground::of_points(lattice, some(), sizes, MOST_SAMPLE_CELLS, interrupt::check)? {
                 heights.extend(corners().filter(|corner| ground.has(*corner)).map(|[_, _, height]| height));
