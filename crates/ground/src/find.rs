@@ -12,7 +12,7 @@
 
 use crate::cells::Cells;
 use crate::fill::filled;
-use crate::morphology::{EMPTY, dilation, erosion};
+use crate::morphology::{EMPTY, NEIGHBOURS, dilation, erosion, only_where};
 use crate::pits::without_pits;
 use crate::plane::{from_middle, with_surroundings};
 use crate::regions::{RegionRule, ground_regions};
@@ -20,8 +20,6 @@ use crate::sizes::GroundSizes;
 use crate::slope::slopes;
 use crate::terrain::{NEIGHBOUR, Terrain};
 
-/// The radius of three by three cells, in cells.
-pub(crate) const NEIGHBOURS: f64 = 1.5;
 /// Discs have their middles and their cells no farther than this from points, in metres.
 const EXTENSION: f64 = 4.0;
 /// Up to this radius in metres discs grow by a metre, up to the next by two, and then by a tenth.
@@ -120,11 +118,6 @@ fn kept_cells<E>(
     // Corners of a hall are cut off by smaller discs, and came back with it: it does not go on into them.
     let low = uncut.with(&cut, false, |is_uncut, radius| is_uncut && radius == 0.0);
     ground_regions(&kept, (&low, &wide), &terrain, IN_HALLS, check)
-}
-
-/// Returns `heights` in the cells that are `wanted`.
-pub(crate) fn only_where(heights: &Cells<f32>, wanted: &Cells<bool>) -> Cells<f32> {
-    heights.with(wanted, EMPTY, |height, is_wanted| if is_wanted { height } else { EMPTY })
 }
 
 /// What openings with discs need.

@@ -5,6 +5,9 @@ use crate::cells::{Cells, SIDE, Window};
 /// The height of a cell without one.
 pub(crate) const EMPTY: f32 = f32::INFINITY;
 
+/// The radius of three by three cells, in cells.
+pub(crate) const NEIGHBOURS: f64 = 1.5;
+
 /// Returns the least height within `radius` cells of each cell.
 pub(crate) fn erosion(heights: &Cells<f32>, radius: f64) -> Cells<f32> {
     let disc = Disc::new(radius);
@@ -20,6 +23,11 @@ pub(crate) fn dilation(heights: &Cells<f32>, radius: f64) -> Cells<f32> {
         greatest.iter_mut().for_each(|height| *height = turned(*height));
         greatest
     })
+}
+
+/// Returns `heights` in the cells that are `wanted`.
+pub(crate) fn only_where(heights: &Cells<f32>, wanted: &Cells<bool>) -> Cells<f32> {
+    heights.with(wanted, EMPTY, |height, is_wanted| if is_wanted { height } else { EMPTY })
 }
 
 /// Returns the height upside down.

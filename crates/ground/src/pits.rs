@@ -1,8 +1,7 @@
 //! Low noise: points far below all around them. Below a closed canopy the ground looks like that too, where few pulses reach it.
 
 use crate::cells::{Cells, Window};
-use crate::find::{NEIGHBOURS, only_where};
-use crate::morphology::{EMPTY, dilation, erosion};
+use crate::morphology::{EMPTY, NEIGHBOURS, dilation, erosion, only_where};
 
 /// A pit may be noise if a closing by its neighbours lies so many widths of a cell above it ...
 const DEEP: f32 = 3.0;

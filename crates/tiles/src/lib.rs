@@ -18,6 +18,7 @@ pub mod geopackage;
 pub mod gltf;
 pub mod gzip;
 mod huffman;
+pub mod imagery_url;
 pub mod lod;
 pub mod map_tiles;
 pub mod normals;

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use crate::options::ImageryUrl;
+use crate::imagery_url::ImageryUrl;
 use sys::{Error, Result};
 
 /// The page as `npm run build --prefix viewer` makes it; empty if it was not there when the program was built.

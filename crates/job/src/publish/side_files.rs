@@ -16,7 +16,7 @@ use sys::{Error, Result, disk};
 use tiles::breakline_list::lines_of;
 use tiles::frame::Frame;
 use tiles::gltf::one_file::{write_remade_terrain, write_terrain};
-use tiles::options::ImageryUrl;
+use tiles::imagery_url::ImageryUrl;
 use tiles::page::page_for;
 use tiles::preview::canvas::{Canvas, PreviewPixel};
 use tiles::preview::layout::world_file;
