@@ -36,7 +36,7 @@ pub struct CloudOptions {
     /// Also write index.html, a page that shows the terrain: put the output on a web server.
     #[arg(long)]
     pub page: bool,
-    /// Write the page, which drapes map tiles over the terrain, such as https://tiles.example.org/{z}/{x}/{y}.png.
+    /// Write the page, which drapes map tiles over the terrain for all visitors: a URL with {z}, {x} and {y}, whose server sends CORS headers.
     #[arg(long, value_name = "URL")]
     pub imagery: Option<String>,
     /// Also write terrain tiles for globes such as CesiumJS to terrain/. They need --height-offset if heights are above sea level.
