@@ -26,12 +26,13 @@ impl CellCount {
         self.lone.saturating_mul(2) >= self.blocks
     }
 
-    /// Returns about how many blocks the ground of so many square metres takes, where points are so many metres apart.
-    pub fn of_area(square_metres: f64, lattice: crate::MetricLattice, spacing: f64) -> CellCount {
+    /// Returns about how many blocks the ground of rectangles takes, whose sides are so many metres, where points are so many metres apart.
+    pub fn of_rectangles(rectangles: &[[f64; 2]], lattice: crate::MetricLattice, spacing: f64) -> CellCount {
         let side = f64::from(lattice.squares_for(spacing).steps) * f64::from(SIDE) * lattice.horizontal;
         // Along a line, blocks stick out by one in all.
-        let along = square_metres.max(0.0).sqrt() / side + 1.0;
-        CellCount { blocks: (along * along) as u64, lone: 0 }
+        let along = |length: f64| length.max(0.0) / side + 1.0;
+        let blocks = rectangles.iter().map(|[width, height]| along(*width) * along(*height)).sum::<f64>();
+        CellCount { blocks: blocks as u64, lone: 0 }
     }
 }
 
@@ -122,7 +123,7 @@ mod tests {
         let most = area.cell_count();
         assert!(cells <= most.cells() && most.cells() * 8 <= cells * 9, "{cells}, {most:?}");
         assert!(area.least_cells(area.spacing()) * 8 >= cells * 7 && !most.is_scattered());
-        let about = CellCount::of_area(1e6, LATTICE, area.spacing()).cells();
+        let about = CellCount::of_rectangles(&[[1e3, 1e3]], LATTICE, area.spacing()).cells();
         assert!(about * 8 <= cells * 9 && about * 9 >= cells * 8, "{about} instead of {cells}");
     }
 

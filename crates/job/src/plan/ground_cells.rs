@@ -7,7 +7,7 @@ use crate::progress::number_text::{grouped, mebibytes};
 use ground::{BYTES_PER_CELL, CellCount, CoveredArea, MetricLattice, PointCollector};
 use serde::{Deserialize, Serialize};
 
-/// The most cells of the ground of a sample. They fit the least `[limits] memory`, and do not depend on it: the colours do on the sample.
+/// The most cells of the ground of a sample. They do not depend on `[limits] memory`: the colours depend on the sample.
 pub(crate) const MOST_SAMPLE_CELLS: u64 = 1 << 21;
 
 /// With fewer points, a sample does not tell how far apart all are.
@@ -30,8 +30,10 @@ pub struct GroundCells {
 /// What is known of a cloud before its points are read.
 pub(crate) struct KnownCloud<'a> {
     pub(crate) lattice: MetricLattice,
-    /// The area of the boxes that headers claim, in square metres.
-    pub(crate) square_metres: f64,
+    /// The sides of the boxes that headers claim, in metres.
+    pub(crate) boxes: &'a [[f64; 2]],
+    /// The sides of the box around all of them.
+    pub(crate) extent: [f64; 2],
     /// The records that are decoded.
     pub(crate) records: u64,
     /// Those that the sample has seen.
@@ -43,7 +45,7 @@ pub(crate) struct KnownCloud<'a> {
 impl GroundCells {
     /// Estimates the cells of a cloud.
     pub(crate) fn of(cloud: KnownCloud) -> GroundCells {
-        let KnownCloud { lattice, square_metres, records, seen, sample } = cloud;
+        let KnownCloud { lattice, boxes, extent, records, seen, sample } = cloud;
         let mut kept = 0u64;
         let mut area = CoveredArea::new(lattice);
         area.add(sample.inspect(|_| kept += 1));
@@ -53,16 +55,21 @@ impl GroundCells {
         let times = (records as f64 / seen.max(1) as f64).max(1.0);
         // Fewer points cover no more of the squares for a point than all do. Where they have squares for themselves, they show nothing.
         let by_sample = if area.shows_density() { area.spacing() } else { f64::INFINITY };
+        let square_metres = boxes.iter().map(|[width, height]| width * height).sum::<f64>().min(extent[0] * extent[1]);
         let spacing = by_sample.min((square_metres / (kept as f64 * times)).sqrt());
-        let by_boxes = CellCount::of_area(square_metres, lattice, spacing);
+        // Boxes of neighbours have blocks in common: those of the whole are fewer then.
+        let of_boxes = [boxes, &[extent]].map(|all| CellCount::of_rectangles(all, lattice, spacing).cells());
+        let by_boxes = of_boxes[0].min(of_boxes[1]);
         // All points touch no more blocks than each point of the sample does, times the points that it stands for.
         let of_sample = area.cell_count_for(spacing);
         let extended = (of_sample.cells() as f64 * times) as u64;
-        let least = if kept < TELLING_SAMPLE && times > 1.0 { 0 } else { area.least_cells(SURELY * spacing) };
+        // The whole goes by squares too, which are more than a thin box.
+        let tells = by_sample.is_finite() && (kept >= TELLING_SAMPLE || times == 1.0);
+        let least = if tells { area.least_cells(SURELY * by_sample) } else { 0 };
         GroundCells {
             least,
-            about: extended.min(by_boxes.cells()).max(least),
-            is_scattered: of_sample.is_scattered() && extended < by_boxes.cells() / 4,
+            about: extended.min(by_boxes).max(least),
+            is_scattered: of_sample.is_scattered() && extended < by_boxes / 4,
         }
     }
 
@@ -172,7 +179,8 @@ mod tests {
         let sample: Vec<[i32; 3]> = places.flat_map(|first| points.iter().skip(first).take(512)).copied().collect();
         let cloud = KnownCloud {
             lattice: LATTICE,
-            square_metres: side(0) * side(1),
+            boxes: &[[side(0), side(1)]],
+            extent: [side(0), side(1)],
             records: points.len() as u64,
             seen: sample.len() as u64,
             sample: &mut sample.iter().copied(),

@@ -416,11 +416,12 @@ fn known_cells(
     claimed: &[Bounds<2>],
     extent: Bounds<2>,
 ) -> GroundCells {
-    let area = |bounds: &Bounds<2>| bounds.extent(0) as f64 * bounds.extent(1) as f64;
-    let square_steps = claimed.iter().map(area).sum::<f64>().min(area(&extent));
+    let sides = |bounds: &Bounds<2>| [0, 1].map(|axis| bounds.extent(axis) as f64 * lattice.horizontal);
+    let boxes: Vec<[f64; 2]> = claimed.iter().map(sides).collect();
     GroundCells::of(KnownCloud {
         lattice,
-        square_metres: square_steps * lattice.horizontal * lattice.horizontal,
+        boxes: &boxes,
+        extent: sides(&extent),
         records,
         seen: sample.seen(),
         sample: &mut sample.points.iter().map(|([x, y], z)| [*x, *y, *z]),
