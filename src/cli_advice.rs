@@ -53,7 +53,7 @@ fn place_of(all: &Command, option: &str) -> Option<String> {
     let names: Vec<String> = own.map(name_of).collect();
     match &names[..] {
         [] => key_of(option).map(|key| {
-            format!("{option} is no option, but a configuration has {key}; gdt-batch cloud.laz --write-config job.toml writes one")
+            format!("{option} is not a flag, but a configuration has {key}: gdt-batch cloud.laz --write-config job.toml writes one")
         }),
         names => Some(format!("{option} is an option of {}", names.join(", "))),
     }

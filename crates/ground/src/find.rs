@@ -128,7 +128,7 @@ struct Discs<'a> {
     reached: &'a Cells<bool>,
     /// The width of a cell in metres.
     width: f64,
-    /// Of the steepest ground.
+    /// The slope of the steepest ground.
     slope: f64,
 }
 

@@ -29,7 +29,7 @@ const SAMPLES: u64 = 16;
 const COARSE_TICK: Duration = Duration::from_secs(2);
 const FINE_TICK: Duration = Duration::from_millis(20);
 
-/// Give up waiting for a file that somebody is writing after this many looks.
+/// A file that is still being written is waited for so many times.
 const MOST_LOOKS: usize = 3;
 
 /// The size of a file, and a hash of samples of its content.

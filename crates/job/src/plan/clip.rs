@@ -1,6 +1,6 @@
 //! The area of `[input] clip`: the polygons of a file, brought to the system of the job as breaklines are, and then to its lattice.
 //!
-//! Points come to the lattice, and the polygons to one that is a thousand times as fine, each vertex rounded once. Whether a point lies
+//! Points come to the lattice, and the polygons to one that is up to a thousand times as fine, each vertex rounded once. Whether a point lies
 //! inside is decided there, in whole numbers ([`LatticeArea`]). The box of the polygons does for the plan what `bounds` do: it limits the extent, and the nodes of a COPC
 //! file that are read. Unlike `bounds`, it also leaves files aside whose headers lie outside.
 

@@ -48,7 +48,7 @@ impl Extent {
 impl fmt::Display for Extent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Extent { size: [width, length], unit, metres_per_unit, heights: [low, high], height_unit, .. } = self;
-        // Three digits of a small terrain, and whole units of others.
+        // Sides of ten units or more are shown in whole units.
         let decimals = if width.min(*length) < 10.0 { 2 } else { 0 };
         write!(f, "{width:.decimals$} x {length:.decimals$} {unit}")?;
         if *metres_per_unit != 1.0 {
