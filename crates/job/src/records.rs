@@ -23,9 +23,7 @@ pub type RecordRef = store::RecordRef<StepRecord>;
 /// What has become of the records of a job's store since its journal was told.
 pub type RecordChanges = store::RecordChanges<StepRecord>;
 /// The journal of a job.
-pub type Journal<'a> = journal::Journal<'a, JobStep, StepRecord>;
-/// A phase that is to be recorded in it.
-pub type NewEntry = journal::NewEntry<JobStep, StepRecord>;
+pub type Journal = journal::Journal<JobStep, StepRecord>;
 /// A complete phase in it.
 pub type JournalEntry = journal::JournalEntry<JobStep, StepRecord>;
 

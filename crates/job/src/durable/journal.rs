@@ -89,6 +89,15 @@ impl PublishedFile {
 }
 
 impl<S: StepKey, K: RecordKey> JournalEntry<S, K> {
+    /// Returns the entry of `step` with its figures and what it has changed in the store.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if the figures cannot be written down.
+    pub fn new(step: S, figures: &impl Serialize, changes: RecordChanges<K>) -> Result<JournalEntry<S, K>> {
+        let figures = serde_json::value::to_raw_value(figures).map_err(unwritable)?;
+        Ok(JournalEntry { step, changes, files: Vec::new(), figures })
+    }
+
     /// Returns the entry with other figures.
     ///
     /// # Errors
@@ -202,56 +211,32 @@ where
     Ok(Some((header, entries)))
 }
 
-/// The phase and the files of an entry.
+/// The files of an entry.
 #[derive(Deserialize)]
-struct FilesOfStep<S> {
-    step: S,
+struct FilesOfStep {
     files: Vec<PublishedFile>,
 }
 
-/// Calls `visit` with the phases and the files of the journal that an earlier run left, up to the first damaged line.
+/// Returns the names of the files in all journals that an earlier run left, in each up to the first damaged line.
 ///
 /// # Errors
-/// [`Error::Io`] if the journal cannot be read.
-pub fn visit_files<H, S>(directory: &JobDirectory, mut visit: impl FnMut(S, Vec<PublishedFile>)) -> Result<()>
-where
-    H: DeserializeOwned,
-    S: DeserializeOwned,
-{
-    let Some(mut lines) = JournalLines::open(directory)? else { return Ok(()) };
-    if lines.next::<H>()?.is_some() {
-        lines.entries()?.into_iter().for_each(|FilesOfStep { step, files }| visit(step, files));
-    }
-    Ok(())
-}
-
-/// Returns the names of all files in the journal that an earlier run left, up to the first damaged line.
-///
-/// # Errors
-/// [`Error::Io`] if the journal cannot be read.
+/// [`Error::Io`] if a journal cannot be read.
 pub(crate) fn names_of_files(directory: &JobDirectory) -> Result<HashSet<PathBuf>> {
     let mut names = HashSet::new();
-    visit_files::<IgnoredAny, IgnoredAny>(directory, |_, files| names.extend(files.into_iter().map(|file| file.name)))?;
+    for folder in [vec![directory.clone()], directory.folders_of_parts()?].concat() {
+        if let Some(mut lines) = JournalLines::open(&folder)?
+            && lines.next::<IgnoredAny>()?.is_some()
+        {
+            let files = lines.entries::<FilesOfStep>()?.into_iter().flat_map(|entry| entry.files);
+            names.extend(files.map(|file| file.name));
+        }
+    }
     Ok(names)
 }
 
-/// A phase that is to be recorded.
-pub struct NewEntry<S, K>(JournalEntry<S, K>);
-
-impl<S: StepKey, K: RecordKey> NewEntry<S, K> {
-    /// Returns the entry of `step` with its figures and what it has changed in the store.
-    ///
-    /// # Errors
-    /// [`Error::Broken`] if the figures cannot be written down.
-    pub fn new(step: S, figures: &impl Serialize, changes: RecordChanges<K>) -> Result<NewEntry<S, K>> {
-        let figures = serde_json::value::to_raw_value(figures).map_err(unwritable)?;
-        Ok(NewEntry(JournalEntry { step, changes, files: Vec::new(), figures }))
-    }
-}
-
 /// The journal of a run. Any thread may call its methods.
-pub struct Journal<'a, S, K> {
-    directory: &'a JobDirectory,
+pub struct Journal<S, K> {
+    directory: JobDirectory,
     state: Mutex<JournalState<S, K>>,
 }
 
@@ -265,16 +250,16 @@ struct JournalState<S, K> {
     end: u64,
 }
 
-impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
+impl<S: StepKey, K: RecordKey> Journal<S, K> {
     /// Begins a journal that has these `entries` already.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
     pub fn begin(
-        directory: &'a JobDirectory,
+        directory: &JobDirectory,
         header: &impl Serialize,
         entries: Vec<JournalEntry<S, K>>,
-    ) -> Result<Journal<'a, S, K>> {
+    ) -> Result<Journal<S, K>> {
         let path = directory.journal();
         write_pending_lines(
             &path,
@@ -290,27 +275,24 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read or written.
-    pub fn go_on<H>(directory: &'a JobDirectory, header: &H) -> Result<Journal<'a, S, K>>
+    pub fn go_on<H>(directory: &JobDirectory, header: &H) -> Result<Journal<S, K>>
     where
         H: Serialize + DeserializeOwned + PartialEq,
     {
-        let path = directory.journal();
-        let Some(mut lines) = JournalLines::open(directory)? else {
+        let lines = JournalLines::open(directory)?.map(|mut lines| Ok((lines.next::<H>()?, lines))).transpose()?;
+        let Some((_, mut lines)) = lines.filter(|(found, _)| found.as_ref() == Some(header)) else {
             return Journal::begin(directory, header, Vec::new());
         };
-        if lines.next::<H>()?.as_ref() != Some(header) {
-            return Journal::begin(directory, header, Vec::new());
-        }
-        let entries = lines.entries()?;
+        let (path, entries) = (directory.journal(), lines.entries()?);
         let file = disk::open(&path).map_err(Error::io("open", &path))?;
         // A kill may have cut the last line off.
         disk::set_length(&file, lines.before).map_err(Error::io("write", &path))?;
         Ok(Journal::open(directory, entries, file, lines.before))
     }
 
-    fn open(directory: &'a JobDirectory, entries: Vec<JournalEntry<S, K>>, file: File, end: u64) -> Journal<'a, S, K> {
+    fn open(directory: &JobDirectory, entries: Vec<JournalEntry<S, K>>, file: File, end: u64) -> Journal<S, K> {
         let state = JournalState { entries, files: Vec::new(), named: 0, file, end };
-        Journal { directory, state: Mutex::new(state) }
+        Journal { directory: directory.clone(), state: Mutex::new(state) }
     }
 
     /// Returns the records that are there after all phases.
@@ -328,14 +310,6 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
     /// As [`JournalEntry::figures`].
     pub fn figures_of<T: DeserializeOwned>(&self, step: S) -> Result<Option<T>> {
         self.state().entries.iter().find(|entry| entry.step == step).map(JournalEntry::figures).transpose()
-    }
-
-    /// Returns the figures of all entries of `step`.
-    ///
-    /// # Errors
-    /// As [`JournalEntry::figures`].
-    pub fn all_figures_of<T: DeserializeOwned>(&self, step: S) -> Result<Vec<T>> {
-        self.state().entries.iter().filter(|entry| entry.step == step).map(JournalEntry::figures).collect()
     }
 
     /// Returns the number of phases that are complete.
@@ -364,13 +338,13 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
         interrupt::check()?;
         let (figures, files) = work()?;
         self.add_files(&files);
-        self.record(vec![NewEntry::new(step, &figures, RecordChanges::default())?])?;
+        self.record(vec![JournalEntry::new(step, &figures, RecordChanges::default())?])?;
         Ok(figures)
     }
 
     /// Adds results of the phase that is under way.
     pub fn add_files(&self, files: &[PendingFile]) {
-        self.state().files.extend(files.iter().map(|file| PublishedFile::of(self.directory, file)));
+        self.state().files.extend(files.iter().map(|file| PublishedFile::of(&self.directory, file)));
     }
 
     /// Gives the results so far their names, once they are on the disk.
@@ -393,16 +367,13 @@ impl<'a, S: StepKey, K: RecordKey> Journal<'a, S, K> {
     ///
     /// # Errors
     /// [`Error::Io`] if that fails.
-    pub fn record(&self, added: Vec<NewEntry<S, K>>) -> Result<()> {
+    pub fn record(&self, mut entries: Vec<JournalEntry<S, K>>) -> Result<()> {
         self.name_files()?;
         let mut state = self.state();
-        let (last, files) = (added.len() - 1, std::mem::take(&mut state.files));
         state.named = 0;
-        let with_files = added.into_iter().enumerate().map(|(at, NewEntry(entry))| match at == last {
-            true => JournalEntry { files: files.clone(), ..entry },
-            false => entry,
-        });
-        let entries: Vec<JournalEntry<S, K>> = with_files.collect();
+        if let Some(last) = entries.last_mut() {
+            last.files = std::mem::take(&mut state.files);
+        }
         let line = to_line(&entries)?;
         if fault::is_due("torn") {
             // What a power failure may leave of it.

@@ -1,13 +1,12 @@
 //! Which files in an output directory are results of jobs: those that the list of a finished job names, or that of a job whose results are
 //! taking their places.
 
-use crate::durable::listing::exists;
+use crate::durable::listing::{exists, read_if_there};
 use serde_json::{Map, Value};
 use std::collections::HashSet;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use sys::{Error, Result};
-use tiles::checksums::{Checksum, parse_list, read_file};
+use tiles::checksums::{Checksum, parse_list};
 use tiles::file_names::OutputFiles;
 
 /// The results of jobs, by their paths from the output directory.
@@ -43,11 +42,7 @@ impl KnownResults {
     }
 
     fn add(&mut self, list: &Path) -> Result<()> {
-        let text = match read_file(list) {
-            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
-            text => text.map_err(Error::io("read", list))?,
-        };
-        if let Some(files) = parse_list(&text) {
+        if let Some(files) = read_if_there(list)?.and_then(|text| parse_list(&text)) {
             self.names.extend(files.into_iter().map(|(name, _)| PathBuf::from(name)));
             self.has_list = true;
         }

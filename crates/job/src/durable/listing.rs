@@ -1,8 +1,10 @@
 //! The files that a job may have left in an output directory.
 
 use crate::durable::atomic_file::partial_path;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use sys::{Error, Result, disk};
+use tiles::checksums::read_file;
 use tiles::file_names::{MOST_FOLDERS_DEEP, OutputFiles, belongs_into, is_number};
 use tiles::options::ExportFormat;
 use tiles::page::is_page;
@@ -155,6 +157,17 @@ pub(crate) fn check_page_is_ours(results: &OutputFiles) -> Result<()> {
 /// Returns the paths of everything in `folder`; nothing if there is no such folder.
 pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     disk::list(folder).map_err(Error::io("read", folder))
+}
+
+/// Returns what the file at `path` holds; `None` if there is none.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read.
+pub(crate) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>> {
+    match read_file(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        text => text.map(Some).map_err(Error::io("read", path)),
+    }
 }
 
 /// Tells whether something is at `path`.

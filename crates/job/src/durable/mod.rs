@@ -10,7 +10,7 @@ pub mod directory;
 pub(crate) mod file_list;
 pub mod journal;
 pub(crate) mod known_results;
-mod listing;
+pub(crate) mod listing;
 pub mod lock;
 pub mod mapped;
 pub mod obstacles;

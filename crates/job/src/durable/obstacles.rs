@@ -4,14 +4,11 @@ use crate::durable::atomic_file::partial_path;
 use crate::durable::directory::JobDirectory;
 use crate::durable::journal::names_of_files;
 use crate::durable::known_results::KnownResults;
-use crate::durable::listing::{Leftovers, check_page_is_ours, exists, is_folder, is_partial};
+use crate::durable::listing::{Leftovers, check_page_is_ours, exists, is_folder, is_partial, read_if_there};
 use crate::durable::lock::lock_file;
 use serde_json::Value;
-use std::collections::HashSet;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use sys::{Error, Result, disk};
-use tiles::checksums::read_file;
 
 /// Checks that no file, and no dangling link, is where a job needs a folder, that no folder, pipe or device is where it reads or
 /// writes a file (opening a pipe would wait for another process), and that all folders are on one disk.
@@ -80,10 +77,7 @@ pub fn check_results_are_ours(directory: &JobDirectory, page: bool) -> Result<()
 
 /// Tells whether the report at `path` is that of a job.
 fn has_own_report(path: &Path) -> Result<bool> {
-    let report = match read_file(path) {
-        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
-        text => serde_json::from_slice::<Value>(&text.map_err(Error::io("read", path))?).ok(),
-    };
+    let report = read_if_there(path)?.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
     Ok(report.is_some_and(|report| report["generator"].as_str().is_some_and(|by| by.starts_with("gdt-batch"))))
 }
 
@@ -100,22 +94,10 @@ fn first_unknown(directory: &JobDirectory, known: &KnownResults) -> Result<Optio
         }
     }
     if !unknown.is_empty() {
-        let placed = names_in_journals(directory)?;
+        let placed = names_of_files(directory)?;
         unknown.retain(|path| !placed.contains(&directory.name(path)));
     }
     Ok(unknown.into_iter().next())
-}
-
-/// Returns the names of the files that the journals of a job under way name.
-///
-/// # Errors
-/// [`Error::Io`] if one cannot be read.
-fn names_in_journals(directory: &JobDirectory) -> Result<HashSet<PathBuf>> {
-    let mut names = names_of_files(directory)?;
-    for part in directory.folders_of_parts()? {
-        names.extend(names_of_files(&part)?);
-    }
-    Ok(names)
 }
 
 /// Returns the paths of the files that the job keeps for itself, under their names or their partial names.

@@ -6,6 +6,7 @@ use crate::index::{NodeIndex, PartIndex};
 use crate::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
 use crate::levels::level_mesh::{load_mesh, save_mesh};
 use crate::partition::tree::{NodeKind, Tree};
+use crate::plan::job_plan::Plan;
 use crate::records::{LevelSummary, StepRecord, Store, TileSummary};
 use crate::tiles::style::TileStyle;
 use crate::tiles::write_tile::write_glb;
@@ -34,6 +35,21 @@ pub struct LevelStats {
     pub error_m: f64,
     /// Coarser tiles without a mesh, because the tiles below them take too much memory.
     pub left_out: u64,
+}
+
+impl LevelStats {
+    /// Returns what the user should know about coarser tiles without a mesh.
+    pub(crate) fn left_out_warning(&self, plan: &Plan) -> Option<String> {
+        (self.left_out > 0).then(|| {
+            format!(
+                "{} of {} coarser tiles are left out for lack of memory ([limits] memory = \"{}\"): viewers load the finer ones at once; \
+                 fix: more [limits] memory, or a lower [triangulation] max_points_per_tile",
+                self.left_out,
+                self.files + self.left_out,
+                plan.options.limits.memory
+            )
+        })
+    }
 }
 
 impl AddAssign for LevelStats {

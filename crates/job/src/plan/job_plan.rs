@@ -11,6 +11,7 @@ use crate::plan::input_identity::RenamedInputs;
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::plan::missing_attributes::missing_attributes;
 use crate::plan::plan_cut::{CutInput, PlanCut};
+use crate::progress::number_text::grouped;
 use breaklines::Breaklines;
 use crs::Crs;
 use delaunay::geometry::Bounds;
@@ -196,6 +197,20 @@ impl Plan {
     /// Tells whether the mesh stays on the disk until the job is done, so that it can go on with another style.
     pub(crate) fn keeps_mesh(&self) -> bool {
         self.options.limits.keep_steps.keeps(self.decoded_records())
+    }
+
+    /// Returns what the user should know if parts, which have so many points, have grown since the first run of a job that is updated.
+    pub(crate) fn grown_parts_warning(&self, points: &[u64]) -> Option<String> {
+        let most = self.points_per_part().saturating_mul(2);
+        let grown = points.iter().filter(|points| **points > most).count();
+        (self.cut.is_some() && grown > 0).then(|| {
+            format!(
+                "{} more than twice the {} points that a part is to have, so updates of them take longer; fix: run once with --restart, \
+                 which cuts all parts anew",
+                if grown == 1 { "1 part has".into() } else { format!("{grown} parts have") },
+                grouped(self.points_per_part())
+            )
+        })
     }
 
     /// Returns the breaklines; `None` without any.

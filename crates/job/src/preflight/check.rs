@@ -144,13 +144,7 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     check_nothing_in_the_way(&directory)?;
     check_results_are_ours(&directory, options.output.page)?;
     let plan = make_plan(options, LatticeCoarsening::default())?;
-    check_inputs_are_no_results(&plan)?;
-    check_height_offset(&plan)?;
-    check_photo(&plan)?;
-    check_raster(&plan)?;
-    check_map_tiles(&plan)?;
-    check_contours(&plan)?;
-    check_terrain(&plan)?;
+    check_plan(&plan)?;
     let threads = workers(options, plan.records)?;
     let contours = ContourSample::of(&plan)?;
     let mut preflight = if has_filter(&plan) {
@@ -170,6 +164,20 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
         preflight.terrain = estimate::terrain(vertices.unwrap_or(preflight.kept), &options.output);
     }
     Ok((preflight, plan))
+}
+
+/// Checks that no input would be overwritten, and that the results that the user wants can be made, as far as the plan tells.
+///
+/// # Errors
+/// [`Error::Config`] names the option that is wrong; [`Error::Io`] or [`Error::Input`] on a file that it names.
+pub(crate) fn check_plan(plan: &Plan) -> crate::Result<()> {
+    check_inputs_are_no_results(plan)?;
+    check_height_offset(plan)?;
+    check_photo(plan)?;
+    check_raster(plan)?;
+    check_map_tiles(plan)?;
+    check_contours(plan)?;
+    Ok(check_terrain(plan).map(|_| ())?)
 }
 
 /// Checks that the machine has what the job of `plan` needs. Reads a sample of the points, on the threads of the current rayon pool,

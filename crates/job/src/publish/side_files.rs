@@ -12,6 +12,7 @@ use crate::records::{StepRecord, Store};
 use breaklines::Breaklines;
 use lattice::Lattice;
 use std::path::PathBuf;
+use std::sync::Arc;
 use sys::{Error, Result, disk};
 use tiles::breakline_list::lines_of;
 use tiles::frame::Frame;
@@ -43,7 +44,7 @@ pub(crate) struct SideFiles<'a> {
     /// Whether colours stand for heights in the preview.
     pub has_ramp: bool,
     /// The edges along breaklines, if there are any, and their lattice.
-    pub breaklines: Option<(&'a Breaklines, &'a Lattice)>,
+    pub breaklines: Option<(Arc<Breaklines>, &'a Lattice)>,
 }
 
 /// Writes the files beside the tiles and returns the number of their bytes.
@@ -66,7 +67,7 @@ pub(crate) fn write_side_files(
     if let Some((frame, root)) = &content.tileset {
         files.extend(pending_tilesets(directory, frame, root, content.copyright)?);
     }
-    if let Some((breaklines, lattice)) = content.breaklines {
+    if let Some((breaklines, lattice)) = &content.breaklines {
         write_pending_lines(&output.breaklines(), lines_of(breaklines, lattice).map(Ok))?;
         files.push(find_pending(&output.breaklines())?);
     }

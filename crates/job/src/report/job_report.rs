@@ -1,5 +1,6 @@
 //! The report of a finished job, as `report.json` holds it for machines.
 
+use crate::durable::atomic_file::PendingFile;
 use crate::levels::make_level::LevelStats;
 use crate::machine;
 use crate::mesh::hull_rule::HullRule;
@@ -13,6 +14,7 @@ use crate::progress::stats::StageStats;
 use crate::publish::contours::write_contours::ContourStats;
 use crate::publish::exports::write_exports::ExportedFile;
 use crate::publish::map_tiles::write_map_tiles::MapTileStats;
+use crate::publish::published::Published;
 use crate::publish::raster::write_raster::RasterStats;
 use crate::publish::terrain_tiles::write_terrain::TerrainStats;
 use crate::report::breakline_report::BreaklineReport;
@@ -25,6 +27,7 @@ use crate::tiles::vertex_colors::ColorSource;
 use crate::tiles::write_tile::TileStats;
 use delaunay::voronoi::counts::STEP_NAMES;
 use delaunay_gpu::figures::GpuFigures;
+use delaunay_gpu::triangulator::Triangulator;
 use lattice::Lattice;
 use lattice::VertexDigest;
 use points::options::InputOptions;
@@ -33,10 +36,12 @@ use points::surface_warnings::unclear_returns;
 use points::transformation::{Transformation, transformations};
 use points::{NetworkTraffic, PlausiblePoints, PointCounts, TextReading};
 use rust_decimal::prelude::ToPrimitive;
+use selection::Figures;
 use serde::{Deserialize, Serialize};
 use sys::Warnings;
 use sys::{Error, Result};
 use tiles::checksums::{Checksum, seal};
+use tiles::options::MaxError;
 
 /// The report of a finished job.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -226,72 +231,59 @@ impl PipelineTimes {
     }
 }
 
-/// What a report is put together from.
-pub struct ReportParts {
-    /// What was read.
-    pub points: PointCounts,
-    /// How vertices were selected; `None` if all points are.
-    pub selection: Option<SelectionReport>,
-    /// The points on the ground; `None` where all are wanted.
-    pub ground: Option<u64>,
-    /// Points that were not selected from, because another has the same x and y.
-    pub duplicates: u64,
-    /// The sum over all leaves.
-    pub leaves: LeafStats,
-    /// The GPU that helped.
-    pub gpu: Option<String>,
-    /// What it did.
-    pub gpu_figures: Option<GpuFigures>,
-    /// Seconds by step on that GPU.
-    pub gpu_steps: Vec<(&'static str, f64)>,
-    /// The sum over all tiles.
-    pub tiles: TileStats,
-    /// The sum over all coarser tiles.
-    pub levels: LevelStats,
-    /// The raster.
-    pub raster: Option<RasterStats>,
-    /// The map tiles of heights.
-    pub pmtiles: Option<MapTileStats>,
-    /// The mesh for other programs.
-    pub exports: Vec<ExportedFile>,
-    /// The contour lines.
-    pub contours: Option<ContourStats>,
-    /// The terrain tiles for globes.
-    pub terrain: Option<TerrainStats>,
-    /// What gives vertices their colours.
-    pub vertex_colors: ColorSource,
-    /// How much an update has changed.
-    pub update: Option<ChangeCounts>,
+/// What all parts hold together, and what their phases took.
+#[derive(Default)]
+pub(crate) struct PartFigures {
     /// The number of parts.
     pub parts: u64,
-    /// The part that took the longest.
-    pub slowest_part: Option<SlowestPart>,
-    /// The largest resident set of the processes that did other phases, in bytes.
-    pub peak_memory: Option<u64>,
-    /// Seconds from start to end.
-    pub wall_s: f64,
-    /// Seconds of processor time of the tasks that did other phases.
-    pub cpu_s_of_tasks: f64,
-    /// What the user should know about the results.
-    pub warnings: Warnings,
-    /// Bytes of results besides the tiles.
-    pub other_bytes: u64,
+    /// The sum over all leaves.
+    pub leaves: LeafStats,
+    /// The sum over all tiles.
+    pub tiles: TileStats,
+    /// The sum over all coarser tiles of parts.
+    pub levels: LevelStats,
+    /// How vertices were selected; `None` if all points are.
+    pub selection: Option<Figures>,
+    /// The points that they were selected from: all, or those on the ground.
+    pub wanted: u64,
+    /// Points that were not selected from, because another has the same x and y.
+    pub duplicates: u64,
     /// Bytes of temporary files.
     pub temporary: u64,
+    /// The part that took the longest.
+    pub slowest: Option<SlowestPart>,
+    /// The largest resident set of the processes that did the phases, in bytes.
+    pub peak_memory: Option<u64>,
+    /// Seconds of processor time of the tasks that did them.
+    pub cpu_s_of_tasks: f64,
+}
+
+/// What a report is put together from.
+pub(crate) struct ReportParts<'a> {
+    /// What was read.
+    pub points: PointCounts,
+    /// What all parts hold.
+    pub figures: PartFigures,
+    /// What is beside the tiles.
+    pub published: Published,
+    /// Knows the GPU.
+    pub triangulator: &'a Triangulator,
+    /// How much an update has changed.
+    pub update: Option<ChangeCounts>,
+    /// Seconds from start to end.
+    pub wall_s: f64,
     /// The stages.
     pub stages: Vec<StageStats>,
     /// Worker threads.
     pub threads: usize,
-    /// The memory limit in bytes.
-    pub memory: u64,
     /// Steps that an interrupted run had finished.
     pub resumed: u64,
     /// The start of the job.
     pub clock: JobClock,
     /// What tells the job from others.
     pub identity: JobIdentity,
-    /// The checksum of the list of the other results.
-    pub file_list: Checksum,
+    /// The list of the other results.
+    pub list: PendingFile,
 }
 
 /// More notes than this, one for each of thousands of files, would hide other warnings.
@@ -304,7 +296,8 @@ fn hull_length(plan: &Plan) -> f64 {
 
 impl Report {
     /// Puts the report together.
-    pub fn new(plan: &Plan, mut parts: ReportParts) -> Report {
+    pub(crate) fn new(plan: &Plan, mut parts: ReportParts) -> Report {
+        let ReportParts { figures, published, triangulator, .. } = parts;
         let (mut warnings, mut notes) = (plan.all_warnings(), Warnings::default());
         notes.extend(std::mem::take(&mut parts.points.notes));
         notes.shorten(MAX_NOTES);
@@ -320,32 +313,37 @@ impl Report {
         warnings.extend(unclear_returns(&plan.options.input, &parts.points));
         warnings.extend(notes);
         warnings.extend(parts.points.examples.iter().cloned());
-        warnings.extend(parts.warnings);
+        warnings.extend(published.warnings);
+        let ground = plan.options.input.finds_ground().then_some(figures.wanted);
+        let selection = match (figures.selection, plan.options.output.max_error) {
+            (Some(selected), MaxError::Units(bound)) => Some(SelectionReport::new(plan, bound, &selected)),
+            _ => None,
+        };
         Report {
             generator: concat!("gdt-batch ", env!("CARGO_PKG_VERSION")).into(),
-            sites: parts.leaves.sites,
-            selection: parts.selection,
-            ground: parts.ground,
-            extent: parts.leaves.bounds.map(|bounds| Extent::of(plan, bounds)),
-            triangles: parts.tiles.triangles,
-            cut_triangles: parts.tiles.cut_triangles,
-            hull_triangles: parts.tiles.slivers,
-            hull_length: (parts.tiles.slivers > 0).then(|| hull_length(plan)),
-            tiles: parts.tiles.files,
-            levels: parts.levels,
-            raster: parts.raster,
-            pmtiles: parts.pmtiles,
-            exports: parts.exports,
+            sites: figures.leaves.sites,
+            selection,
+            ground,
+            extent: figures.leaves.bounds.map(|bounds| Extent::of(plan, bounds)),
+            triangles: figures.tiles.triangles,
+            cut_triangles: figures.tiles.cut_triangles,
+            hull_triangles: figures.tiles.slivers,
+            hull_length: (figures.tiles.slivers > 0).then(|| hull_length(plan)),
+            tiles: figures.tiles.files,
+            levels: published.levels,
+            raster: published.raster,
+            pmtiles: published.map_tiles,
+            exports: published.exports,
             update: parts.update,
-            contours: parts.contours,
-            terrain: parts.terrain,
-            covered_share: covered_share(plan, parts.tiles.double_area),
-            vertex_colors: parts.vertex_colors,
-            seam_share: parts.tiles.seam_triangles as f64 / parts.tiles.triangles.max(1) as f64,
-            duplicates: parts.leaves.duplicates + parts.duplicates,
+            contours: published.contours,
+            terrain: published.terrain,
+            covered_share: covered_share(plan, figures.tiles.double_area),
+            vertex_colors: published.vertex_colors,
+            seam_share: figures.tiles.seam_triangles as f64 / figures.tiles.triangles.max(1) as f64,
+            duplicates: figures.leaves.duplicates + figures.duplicates,
             files: plan.inputs.len(),
             skipped: plan.skipped.clone(),
-            surface: match parts.ground {
+            surface: match ground {
                 Some(ground) => {
                     let [found, kept] = [ground, parts.points.kept].map(grouped);
                     let share = percent(ground, parts.points.kept);
@@ -356,25 +354,25 @@ impl Report {
             points: parts.points,
             breaklines: plan.breaklines.as_ref().map(BreaklineReport::of),
             clip: plan.clip.as_ref().map(|clip| ClipReport::of(clip, &plan.lattice)),
-            leaves: LeafStats { bounds: None, ..parts.leaves },
-            gpu: parts.gpu,
-            gpu_figures: parts.gpu_figures,
-            steps: PipelineTimes::new(&parts.leaves, &parts.gpu_steps),
-            parts: parts.parts,
-            slowest_part: parts.slowest_part,
+            leaves: LeafStats { bounds: None, ..figures.leaves },
+            gpu: triangulator.gpu().map(str::to_owned),
+            gpu_figures: triangulator.gpu_figures(),
+            steps: PipelineTimes::new(&figures.leaves, &triangulator.gpu_steps()),
+            parts: figures.parts,
+            slowest_part: figures.slowest,
             lattice: plan.lattice.clone(),
             unit: plan.unit.clone(),
             crs: plan.crs.name.clone(),
             transformations: transformations(plan.inputs.iter().map(|input| &input.source)),
             network: Some(NetworkTraffic::so_far()).filter(|traffic| traffic.requests > 0),
-            bytes_written: parts.tiles.bytes + parts.levels.bytes + parts.other_bytes,
-            bytes_temporary: parts.temporary,
-            peak_memory: machine::peak_memory().max(parts.peak_memory),
-            memory_limit: parts.memory,
+            bytes_written: figures.tiles.bytes + published.levels.bytes + published.bytes + parts.list.bytes,
+            bytes_temporary: figures.temporary,
+            peak_memory: machine::peak_memory().max(figures.peak_memory),
+            memory_limit: plan.options.limits.memory.0,
             threads: parts.threads,
             resumed: parts.resumed,
             wall_s: parts.wall_s,
-            cpu_s: parts.clock.cpu_s() + parts.cpu_s_of_tasks,
+            cpu_s: parts.clock.cpu_s() + figures.cpu_s_of_tasks,
             stages: parts.stages,
             warnings,
             input: InputOptions { files: Vec::new(), ..plan.options.input.clone() },
@@ -384,8 +382,8 @@ impl Report {
             options_fingerprint: Some(parts.identity.options),
             job_fingerprint: Some(parts.identity.job),
             submission: parts.identity.submission,
-            vertex_digest: parts.leaves.vertices,
-            file_list: parts.file_list,
+            vertex_digest: figures.leaves.vertices,
+            file_list: parts.list.checksum,
             checksum: Checksum::default(),
         }
     }

@@ -3,44 +3,38 @@
 
 use crate::durable::cleaning::remove_job;
 use crate::durable::directory::JobDirectory;
+use crate::durable::listing::entries;
 use crate::durable::lock::Lock;
 use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::options::{JobOptions, RunOptions};
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
-use crate::plan::job_plan::{Claims, Plan};
 use crate::plan::lattice_choice::LatticeCoarsening;
-use crate::plan::make_plan::{are_there_far_points, make_plan, make_plan_on};
+use crate::plan::make_plan::are_there_far_points;
 use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::contour_estimate::ContourSample;
-use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::preflight::kept_points::KeptPoints;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
-use crate::publish::contours::check::check_contours;
-use crate::publish::height_offset_check::check_height_offset;
-use crate::publish::map_tiles::check::check_map_tiles;
-use crate::publish::raster::check::check_raster;
-use crate::publish::terrain_tiles::check::check_terrain;
 use crate::report::change_counts::ChangeCounts;
 use crate::report::job_report::Report;
 use crate::run::damage::{damaged_by_tasks, is_damage};
-use crate::run::earlier_run::{EarlierRun, RunStart, place_results_of_finished_job, start};
+use crate::run::earlier_run::{EarlierRun, PlanOrigin, RunStart, place_results_of_finished_job, start};
 use crate::run::finished::{InPlace, known_submission, replaced_terrain, results_in_place};
-use crate::run::part_entries::PartJournals;
+use crate::run::job::Process;
+use crate::run::part_entries::PartEntries;
 use crate::run::phases::do_phases;
-use crate::run::phases::plan_phase::note_skipped;
+use crate::run::phases::plan_phase::{find_plan, note_skipped};
 use crate::run::phases::stage_costs::stage_costs;
 use crate::run::update::changes::{end_without_changes, mark_placed};
 use crate::run::update::first_plan_file::has_first_plan;
 use crate::run::update::mending::Mended;
 use crate::run::whole_run::WholeRun;
-use crate::tiles::vertex_colors::check_photo;
 use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
 use std::sync::Mutex;
+use sys::ErrorKind;
 use sys::threads::on_threads;
-use sys::{ErrorKind, disk};
 
 /// What the user must know where a lock keeps nobody out.
 pub(crate) const NO_LOCKS: &str =
@@ -75,7 +69,7 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
     let directory = JobDirectory::new(&options.output.directory);
     check_nothing_in_the_way(&directory)?;
     let (mut lock, mut earlier) = (None, None);
-    if !disk::list(directory.job()).map_err(sys::Error::io("read", directory.job()))?.is_empty() {
+    if !entries(directory.job())?.is_empty() {
         // Before anything else can fail: an earlier run may have been cut off while its results took their places.
         lock = Some(directory.lock()?);
         earlier = read_earlier(&directory, run)?;
@@ -83,7 +77,7 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
             let path = directory.journal();
             run.progress.note(&format!("{} is missing: everything is computed again", path.display()));
         } else if let (None, false) = (&earlier, run.restart)
-            && let InPlace::ThisJob(report) = results_in_place(&directory, options, run.submission, || Ok(false))?
+            && let InPlace::ThisJob(report) = results_in_place(&directory, options, run.submission)?
         {
             run.progress.note("the interrupted run had put all its results in place");
             on_threads(workers(options, 0)?, || remove_job(&directory))?;
@@ -111,10 +105,12 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
     let mut coarsening = known.unwrap_or_default();
     let mut has_looked = coarsening.far_points;
     loop {
-        let outcome = attempt(&job, coarsening, earlier.take(), lock.take());
+        let error = match attempt(&job, coarsening, earlier.take(), lock.take()) {
+            Ok(report) => return Ok(report),
+            Err(error) => error,
+        };
         // A few points that are mistakes must not cost all others their precision.
-        if matches!(outcome, Err(Error::OtherThanClaimed { is_bad_file: false } | Error::TooFine { .. })) && !has_looked
-        {
+        if matches!(error, Error::OtherThanClaimed { is_bad_file: false } | Error::TooFine { .. }) && !has_looked {
             has_looked = true;
             coarsening.far_points = on_threads(workers(options, 0)?, || are_there_far_points(options, coarsening))?;
             if coarsening.far_points {
@@ -122,36 +118,34 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
                 continue;
             }
         }
-        if let (Err(Error::OtherThanClaimed { is_bad_file }), false) = (&outcome, coarsening.measured) {
-            run.progress.note(match is_bad_file {
-                true => "a file is bad and will be left out; measuring all files and starting again",
-                false => "what was read contradicts the header of a file; measuring all files and starting again",
-            });
-            coarsening.measured = true;
-            continue;
-        }
-        if let Err(Error::DamagedSteps) = outcome {
-            if is_by_tasks {
-                // The work of many machines is not done again by one.
-                return Err(damaged_by_tasks(&job.directory));
+        match error {
+            Error::OtherThanClaimed { is_bad_file } if !coarsening.measured => {
+                run.progress.note(match is_bad_file {
+                    true => "a file is bad and will be left out; measuring all files and starting again",
+                    false => "what was read contradicts the header of a file; measuring all files and starting again",
+                });
+                coarsening.measured = true;
             }
-            run.progress.note(match options.updates {
+            // The work of many machines is not done again by one.
+            Error::DamagedSteps if is_by_tasks => return Err(damaged_by_tasks(&job.directory)),
+            Error::DamagedSteps => run.progress.note(match options.updates {
                 true => "what the last run left is damaged; everything is computed again",
                 false => "what the interrupted run left is damaged; starting over",
-            });
-            continue;
+            }),
+            // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
+            Error::TooFine { vertical, what } if may_coarsen(options, vertical) => {
+                let (power, axes) = match vertical {
+                    true => (&mut coarsening.vertical, "z"),
+                    false => (&mut coarsening.horizontal, "x and y"),
+                };
+                if *power >= MAX_COARSENINGS {
+                    return Err(Error::TooFine { vertical, what });
+                }
+                run.progress.note(&format!("{what}; starting again with a coarser step in {axes}"));
+                *power += 1;
+            }
+            error => return Err(error),
         }
-        // Only the finished mesh knows its longest triangle. To round in advance would often round for nothing.
-        let Err(Error::TooFine { vertical, what }) = outcome else { return outcome };
-        let (power, axes) = match vertical {
-            true => (&mut coarsening.vertical, "z"),
-            false => (&mut coarsening.horizontal, "x and y"),
-        };
-        if !may_coarsen(options, vertical) || *power >= MAX_COARSENINGS {
-            return Err(Error::TooFine { vertical, what });
-        }
-        run.progress.note(&format!("{what}; starting again with a coarser step in {axes}"));
-        *power += 1;
     }
 }
 
@@ -186,23 +180,8 @@ fn attempt(
     let header =
         JobHeader { fingerprint: job.fingerprint.clone(), coarsening, id: 0, submission: job.submission, begun: None };
     let stage = JobProgress::new(run.progress, clock, Vec::new()).stage("plan", 1, "job");
-    let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
-    let has_plan = known.is_some();
-    let (mut plan, is_update) = match known {
-        Some(plan) => (plan, false),
-        None => {
-            let first = earlier.as_ref().and_then(|earlier| earlier.first_plan(directory, &header, run.progress));
-            on_threads(workers(options, 0)?, || planned(job, coarsening, first.as_ref()))?
-        }
-    };
-    check_inputs_are_no_results(&plan)?;
+    let (mut plan, origin) = find_plan(directory, options, &header, earlier.as_ref(), run.progress)?;
     plan.warnings.extend(job.modified.clone());
-    check_height_offset(&plan)?;
-    check_photo(&plan)?;
-    check_raster(&plan)?;
-    check_map_tiles(&plan)?;
-    check_contours(&plan)?;
-    check_terrain(&plan)?;
     stage.advance(1);
     let planned = stage.finish();
     let threads = workers(options, plan.records)?;
@@ -212,6 +191,7 @@ fn attempt(
     note_skipped(&plan.skipped, progress);
     contours_of_all.and_then(|contours| contours.warning(&plan)).iter().for_each(|warning| progress.note(warning));
     plan.ground_cells.and_then(|cells| cells.warning(options)).iter().for_each(|warning| progress.note(warning));
+    let is_update = origin == PlanOrigin::Update;
     if !run.force && !is_by_tasks && !is_update {
         on_threads(threads, || require_memory_and_disk(&plan, threads, contours.as_ref()))?;
     }
@@ -234,7 +214,7 @@ fn attempt(
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
         if options.updates {
-            let mended = earlier.as_ref().map(EarlierRun::mended);
+            let mended = earlier.as_ref().and_then(|earlier| earlier.mended.as_ref());
             if end_without_changes(directory)? || mended.is_some_and(|mended| mended.is_interrupted) {
                 progress.note("the interrupted run had written all its results");
                 return Ok(report);
@@ -255,20 +235,26 @@ fn attempt(
     job.triangulator.prepare(plan.records, threads);
     let keeps_mesh = plan.keeps_mesh();
     on_threads(threads, || {
-        let start = start(directory, &header, earlier, has_plan, is_update, is_by_tasks, run.progress)?;
-        let RunStart { journal, job_id, resumed } = start;
-        let whole_run = WholeRun {
+        let RunStart { journal, job_id, resumed } =
+            start(directory, &header, earlier, origin, is_by_tasks, run.progress)?;
+        // That tasks or an earlier run have done phases is nothing to tell.
+        let told = if is_by_tasks || is_update { 0 } else { resumed };
+        let process = Process {
             triangulator: &job.triangulator,
             directory,
-            journal: &journal,
             progress,
             threads,
             clock,
+            id: job_id,
+            checks_points: told > 0 || options.updates,
+            is_task: false,
+        };
+        let whole_run = WholeRun {
+            process,
+            journal: &journal,
             begun,
             identity: job.fingerprint.identity(options, job.submission)?,
-            job_id,
-            // That tasks or an earlier run have done phases is nothing to tell.
-            resumed: if is_by_tasks || is_update { 0 } else { resumed },
+            resumed: told,
             stages: Mutex::new(vec![planned]),
         };
         // What tasks left was not compared with its hashes, and a disk may fail meanwhile.
@@ -276,67 +262,34 @@ fn attempt(
             error if resumed > 0 && is_damage(&error, directory) => Error::DamagedSteps,
             error => error,
         });
-        drop(whole_run);
         // If the journals cannot be read now, something may be kept.
-        let of_parts = || PartJournals::of(directory, job_id).map_or(1, |parts| parts.len());
-        let complete = journal.complete() + outcome.as_ref().err().map_or(0, |_| of_parts());
+        let count = |parts: Vec<PartEntries>| parts.iter().map(|part| part.entries.len() as u64).sum();
+        let of_parts = || PartEntries::of_all(directory, job_id).map_or(1, count);
+        let phases = journal.complete() + if outcome.is_err() { of_parts() } else { 0 };
         drop(journal);
-        let ended =
-            EndedRun { directory, phases: complete, is_by_tasks, keeps_mesh, updates: options.updates, is_update };
-        ended.end(outcome)
+        job.end(outcome, phases, keeps_mesh, is_update)
     })
 }
 
-/// Returns the plan of a job, and whether it is an update of the job that had the plan `first`.
-fn planned(job: &JobRequest, coarsening: LatticeCoarsening, first: Option<&Plan>) -> Result<(Plan, bool)> {
-    let options = job.options;
-    if let Some(first) = first {
-        let plan = make_plan_on(Some(&first.lattice), options, coarsening)?;
-        match plan.laid_out_as(first) {
-            Ok(plan) => return Ok((plan.with_keys(&job.fingerprint)?, true)),
-            Err(why) => job.run.progress.note(&format!("everything is computed again: {why}")),
-        }
-    }
-    let mut plan = make_plan(options, coarsening)?;
-    if options.updates {
-        plan = plan.with_keys(&job.fingerprint)?;
-        plan.claims = plan.claims.map(Claims::with_room);
-    }
-    Ok((plan, false))
-}
-
-/// An attempt that has ended.
-struct EndedRun<'a> {
-    directory: &'a JobDirectory,
-    /// The phases that are complete.
-    phases: u64,
-    is_by_tasks: bool,
-    keeps_mesh: bool,
-    /// Whether the job has `--update`.
-    updates: bool,
-    /// Whether it was an update.
-    is_update: bool,
-}
-
-impl EndedRun<'_> {
-    /// Puts the results in place, or keeps the complete phases if the job can go on from them. Removes everything else, but never the work
-    /// of tasks after an error, nor what an update needs.
-    fn end(self, outcome: Result<Report>) -> Result<Report> {
-        let EndedRun { directory, phases, is_by_tasks, keeps_mesh, updates, is_update } = self;
-        let outcome = outcome.and_then(|report| match place_results_of_finished_job(directory, updates) {
-            Err(sys::Error::Io { source, .. }) if is_by_tasks && source.kind() == std::io::ErrorKind::NotFound => {
+impl JobRequest<'_> {
+    /// Ends an attempt after which so many `phases` are complete. Puts the results in place, or keeps the complete phases if the job can go on
+    /// from them. Removes everything else, but never the work of tasks after an error, nor what an update needs.
+    fn end(&self, outcome: Result<Report>, phases: u64, keeps_mesh: bool, is_update: bool) -> Result<Report> {
+        let JobRequest { options: JobOptions { updates, .. }, directory, is_by_tasks, .. } = self;
+        let outcome = outcome.and_then(|report| match place_results_of_finished_job(directory, *updates) {
+            Err(sys::Error::Io { source, .. }) if *is_by_tasks && source.kind() == std::io::ErrorKind::NotFound => {
                 Err(Error::DamagedSteps)
             }
             placed => Ok(placed.map(|()| report)?),
         });
         match outcome {
-            Ok(report) if updates && has_first_plan(directory)? => {
+            Ok(report) if *updates && has_first_plan(directory)? => {
                 let results = directory.waiting_results();
                 directory.keep_results(&results.iter().map(|path| directory.name(path)).collect())?;
                 mark_placed(directory)?;
                 Ok(report)
             }
-            Err(why) if is_by_tasks && !may_go_on(&why) => Err(why),
+            Err(why) if *is_by_tasks && !may_go_on(&why) => Err(why),
             // With a corrected configuration a job that has freed its mesh may start over, so nothing is promised.
             Err(why @ Error::System(sys::Error::Config(_))) if phases > 0 && !keeps_mesh => Err(why),
             Err(why) if may_go_on(&why) && phases > 0 => {

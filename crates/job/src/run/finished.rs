@@ -4,18 +4,20 @@
 use crate::durable::cleaning::remove_job;
 use crate::durable::directory::JobDirectory;
 use crate::durable::journal;
+use crate::durable::listing::{entries, exists, read_if_there};
 use crate::options::JobOptions;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::progress::number_text::grouped;
 use crate::records::{JobStep, StepRecord};
 use crate::report::job_report::Report;
+use crate::run::planned_job::planned;
 use crate::run::single_process;
 use std::io::ErrorKind;
 use sys::terminal::name;
 use sys::threads::on_threads;
-use sys::{Error, Result, disk};
-use tiles::checksums::{read_file, seal};
+use sys::{Error, Result};
+use tiles::checksums::seal;
 
 /// What a job finds in the place of its results.
 pub(crate) enum InPlace {
@@ -29,25 +31,15 @@ pub(crate) enum InPlace {
 }
 
 /// Returns what the job with these `options` finds in the place of its results. What was done before `submission` does not count.
-/// `is_under_way` tells whether steps of this job are there. The inputs are read only where all else says that the job is finished.
+/// Tasks may be doing the job again. The inputs are read only where all else says that the job is finished.
 ///
 /// # Errors
 /// [`Error::Io`] if the report or an input cannot be read, [`Error::Config`] if there are no inputs.
-pub(crate) fn results_in_place(
-    directory: &JobDirectory,
-    options: &JobOptions,
-    submission: u64,
-    is_under_way: impl FnOnce() -> Result<bool>,
-) -> Result<InPlace> {
-    let waiting = directory.output().report();
-    if disk::exists(&waiting).map_err(Error::io("read", &waiting))? || single_process::is_noted(directory, 0)? {
+pub(crate) fn results_in_place(directory: &JobDirectory, options: &JobOptions, submission: u64) -> Result<InPlace> {
+    if exists(&directory.output().report())? || single_process::is_noted(directory, 0)? {
         return Ok(InPlace::Nothing);
     }
-    let path = directory.results().report();
-    let text = match read_file(&path) {
-        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(InPlace::Nothing),
-        text => text.map_err(Error::io("read", &path))?,
-    };
+    let Some(text) = read_if_there(&directory.results().report())? else { return Ok(InPlace::Nothing) };
     let is_sealed = seal(&text).is_some_and(|(own, found)| own == found);
     // A report of another version may have other fields.
     let report = serde_json::from_slice::<Report>(&text).ok().filter(|_| is_sealed);
@@ -56,7 +48,9 @@ pub(crate) fn results_in_place(
     if report.options_fingerprint != Some(of_options) || report.submission < submission {
         return Ok(InPlace::OtherJob);
     }
-    if is_under_way()? {
+    if let Some((header, false)) = planned(directory, 0)?
+        && header.fingerprint.changed_options(options)?.is_none()
+    {
         return Ok(InPlace::Nothing);
     }
     let is_same = match on_threads(workers(options, 0)?, || Fingerprint::of(options)) {
@@ -78,11 +72,7 @@ pub(crate) fn replaced_terrain(
     options: &JobOptions,
     now: &Fingerprint,
 ) -> Result<Option<String>> {
-    let path = directory.results().report();
-    let text = match read_file(&path) {
-        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
-        text => text.map_err(Error::io("read", &path))?,
-    };
+    let Some(text) = read_if_there(&directory.results().report())? else { return Ok(None) };
     let of_options = Fingerprint::of_options(options)?;
     let report = serde_json::from_slice::<Report>(&text).ok();
     let what = match &report {
@@ -110,11 +100,8 @@ fn are_inputs_gone(why: &Error) -> bool {
 /// # Errors
 /// [`Error::Io`] if the job directory or the report cannot be read.
 pub(crate) fn known_submission(directory: &JobDirectory) -> Result<u64> {
-    let path = directory.results().report();
-    let report = match read_file(&path) {
-        Err(e) if e.kind() == ErrorKind::NotFound => None,
-        text => serde_json::from_slice::<Report>(&text.map_err(Error::io("read", &path))?).ok(),
-    };
+    let text = read_if_there(&directory.results().report())?;
+    let report = text.and_then(|text| serde_json::from_slice::<Report>(&text).ok());
     let of_report = report.map_or(0, |report| report.submission);
     Ok(of_report.max(single_process::submission(directory)?))
 }
@@ -125,7 +112,7 @@ pub(crate) fn known_submission(directory: &JobDirectory) -> Result<u64> {
 /// # Errors
 /// [`Error::Io`] if it cannot be read.
 pub(crate) fn is_rest(directory: &JobDirectory) -> Result<bool> {
-    if disk::list(directory.job()).map_err(Error::io("read", directory.job()))?.is_empty() {
+    if entries(directory.job())?.is_empty() {
         return Ok(false);
     }
     let journal = journal::read::<JobHeader, JobStep, StepRecord>(directory)?;

@@ -6,10 +6,9 @@ use crate::index::PartIndex;
 use crate::machine;
 use crate::progress::clock::JobClock;
 use crate::progress::stats::StageStats;
-use crate::records::{JobStep, Journal, NewEntry, Store};
-use crate::run::done::Done;
+use crate::records::{JobStep, Journal, JournalEntry, Store};
 use crate::run::job::Job;
-use crate::run::part_entries::{entry_of, open_store};
+use crate::run::part_entries::Done;
 use crate::run::update::outdated::forget_from;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -17,37 +16,36 @@ use std::sync::{Mutex, PoisonError};
 use sys::Result;
 
 /// A folder that this process writes to.
-pub(crate) struct Folder<'a> {
-    pub(crate) directory: &'a JobDirectory,
+pub(crate) struct Folder {
+    pub(crate) directory: JobDirectory,
     pub(crate) store: Store,
-    pub(crate) journal: Journal<'a>,
+    pub(crate) journal: Journal,
     clock: JobClock,
     syncs: bool,
-    /// The key of the phase that is under way.
+    /// The key of the phase that is under way, with `--update`. Else 0.
     key: u64,
     /// Held while changes of the store go to the journal: a line may have what another thread has just stored, whose line must come later.
     recording: Mutex<()>,
     _lock: Lock,
 }
 
-/// Returns the figures of `step` of `part`, or of the nodes above the parts, whose folder is `directory`. Unless they are there, and made with
-/// what `key` tells from others, `work` does it and records it.
+/// Returns the figures of `step` of `part`, or of the nodes above the parts. Unless they are there, and made with what `key` tells from
+/// others, `work` does it and records it.
 ///
 /// # Errors
 /// Those of `work`; [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
 pub(crate) fn once<T: DeserializeOwned>(
     job: &Job,
-    directory: &JobDirectory,
     part: PartIndex,
     step: JobStep,
     key: u64,
     work: impl FnOnce(&Folder) -> crate::Result<T>,
 ) -> crate::Result<T> {
     // What is done needs no lock: another process may have it for a later phase.
-    if let Some(done) = done_with(job, directory, part, step, key)? {
-        return Ok(done);
+    if let Some(done) = done_with(job, part, step, key)? {
+        return Ok(done.figures);
     }
-    let folder = Folder::open(job, directory, part)?.with_key(key);
+    let folder = Folder::open(job, part, key)?;
     // Another process may have done it since.
     match folder.done(step)? {
         Some(done) => Ok(done),
@@ -55,43 +53,35 @@ pub(crate) fn once<T: DeserializeOwned>(
     }
 }
 
-/// Returns the figures of `step` of `part`, or of the nodes above the parts, whose folder is `directory`, if it is complete. If it was done
-/// with another key, takes it and what follows from it out of the journal.
+/// Returns what is known of `step` of `part`, or of the nodes above the parts, if it is complete. If it was done with another key, takes it
+/// and what follows from it out of the journal.
 ///
 /// # Errors
 /// [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
 pub(crate) fn done_with<T: DeserializeOwned>(
     job: &Job,
-    directory: &JobDirectory,
     part: PartIndex,
     step: JobStep,
     key: u64,
-) -> crate::Result<Option<T>> {
-    let Some(entry) = entry_of(directory, job.header(part), step)? else { return Ok(None) };
-    let done = entry.figures::<Done<T>>()?;
-    if done.key == key {
-        return Ok(Some(done.figures));
+) -> crate::Result<Option<Done<T>>> {
+    match job.entries(part)?.done(step)? {
+        Some(Done { key: other, .. }) if other != key => forget_from(job, part, step).map(|()| None),
+        done => Ok(done),
     }
-    forget_from(job, directory, part, step)?;
-    Ok(None)
 }
 
-impl<'a> Folder<'a> {
-    /// Opens the folder `directory` of `part`, or of the nodes above the parts, to go on where its journal ends.
+impl Folder {
+    /// Opens the folder of `part`, or of the nodes above the parts, to go on where its journal ends, with a phase that has this key.
     ///
     /// # Errors
     /// [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
-    pub(crate) fn open(job: &Job, directory: &'a JobDirectory, part: PartIndex) -> crate::Result<Folder<'a>> {
-        let (clock, lock) = (JobClock::start(), directory.lock_within()?);
-        let journal = Journal::go_on(directory, &job.header(part))?;
-        let store = open_store(directory, journal.records())?;
+    pub(crate) fn open(job: &Job, part: PartIndex, key: u64) -> crate::Result<Folder> {
+        let (clock, directory) = (JobClock::start(), job.folder(part));
+        let lock = directory.lock_within()?;
+        let journal = Journal::go_on(&directory, &job.header(part))?;
+        let store = Store::open(directory.store(), journal.records())?;
         let (syncs, recording) = (job.syncs(), Mutex::default());
-        Ok(Folder { directory, store, journal, clock, syncs, key: 0, recording, _lock: lock })
-    }
-
-    /// Returns the folder for a phase with this key.
-    pub(crate) fn with_key(self, key: u64) -> Folder<'a> {
-        Folder { key, ..self }
+        Ok(Folder { directory, store, journal, clock, syncs, key, recording, _lock: lock })
     }
 
     /// Returns the figures of `step`, if it is complete.
@@ -116,7 +106,7 @@ impl<'a> Folder<'a> {
         let _recording = self.recording.lock().unwrap_or_else(PoisonError::into_inner);
         let (done, changes) = (self.done_now(figures, stages), self.store.take_changes());
         let dropped = changes.dropped.clone();
-        self.record_all(vec![NewEntry::new(step, &done, changes)?])?;
+        self.record_all(vec![JournalEntry::new(step, &done, changes)?])?;
         self.store.give_back(&dropped)?;
         Ok(done.figures)
     }
@@ -125,7 +115,7 @@ impl<'a> Folder<'a> {
     ///
     /// # Errors
     /// [`sys::Error::Io`].
-    pub(crate) fn record_all(&self, entries: Vec<NewEntry>) -> Result<()> {
+    pub(crate) fn record_all(&self, entries: Vec<JournalEntry>) -> Result<()> {
         if self.syncs {
             self.store.sync()?;
         }

@@ -2,13 +2,14 @@
 
 pub(crate) mod attempt;
 pub(crate) mod damage;
-pub(crate) mod done;
 pub(crate) mod earlier_run;
 pub(crate) mod finished;
 pub(crate) mod folder;
 pub(crate) mod job;
+pub(crate) mod meshed_part;
 pub(crate) mod part_entries;
 pub(crate) mod phases;
+pub(crate) mod planned_job;
 pub(crate) mod single_process;
 pub(crate) mod tasks;
 pub(crate) mod update;

@@ -1,13 +1,16 @@
-//! What the journals of parts say, and opening the stores that they describe.
+//! What the journals of parts tell: which phases are complete, and what they left.
 
-use crate::durable::directory::{JobDirectory, STORE_FILES};
+use crate::durable::directory::JobDirectory;
 use crate::durable::journal;
-use crate::durable::journal::PublishedFile;
+use crate::durable::journal::{PublishedFile, records_of};
 use crate::index::PartIndex;
-use crate::records::{JobStep, JournalEntry, RecordRef, StepRecord, Store};
+use crate::partition::parts::Parts;
+use crate::progress::stats::StageStats;
+use crate::records::{JobStep, JournalEntry, StepRecord, Store};
+use rayon::prelude::*;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
-use sys::Result;
+use sys::{Error, Result, interrupt};
 
 /// The first line of the journal of a part. The nodes above the parts have the number after the last part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,64 +20,136 @@ pub(crate) struct PartHeader {
     pub(crate) part: PartIndex,
 }
 
-/// Returns the entries of the journal in `directory` if it is that of `header`.
-///
-/// # Errors
-/// [`sys::Error::Io`] if it cannot be read.
-pub(crate) fn entries_of(directory: &JobDirectory, header: PartHeader) -> Result<Vec<JournalEntry>> {
-    // Another machine may have written it.
-    directory.probe()?;
-    let read = journal::read::<PartHeader, JobStep, StepRecord>(directory)?;
-    let own = read.filter(|(found, _)| *found == Some(header));
-    Ok(own.map(|(_, entries)| entries).unwrap_or_default())
+/// Returns the folder of `part`, or of the nodes above the `parts`.
+pub(crate) fn folder_of(directory: &JobDirectory, parts: &Parts, part: PartIndex) -> JobDirectory {
+    if part == parts.tree.part { directory.join() } else { directory.part(part) }
 }
 
-/// Returns the entry of `step` in the journal in `directory` if it is that of `header`, and has one.
-///
-/// # Errors
-/// As [`entries_of`].
-pub(crate) fn entry_of(directory: &JobDirectory, header: PartHeader, step: JobStep) -> Result<Option<JournalEntry>> {
-    Ok(entries_of(directory, header)?.into_iter().find(|entry| entry.step == step))
+/// A phase of a part that is complete.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Done<T> {
+    /// What later phases and the report need to know of it.
+    pub(crate) figures: T,
+    /// How long it took, as far as the last process did it.
+    pub(crate) seconds: f64,
+    /// The largest resident set of that process, in bytes, up to the end of the phase.
+    pub(crate) peak_memory: Option<u64>,
+    pub(crate) stages: Vec<StageStats>,
+    /// With `--update`, the key: a hash of everything that the phase was done with. It is done again if that has another key now. Else 0.
+    #[serde(default)]
+    pub(crate) key: u64,
 }
 
-/// The journals of all parts of a job, and of the nodes above them.
-#[derive(Default)]
-pub(crate) struct PartJournals(pub(crate) Vec<(JobDirectory, PartHeader, Vec<JournalEntry>)>);
+/// The phases of a part, or of the nodes above the parts, that are complete.
+pub(crate) struct PartEntries {
+    pub(crate) directory: JobDirectory,
+    pub(crate) header: PartHeader,
+    pub(crate) entries: Vec<JournalEntry>,
+}
 
-impl PartJournals {
-    /// Reads those of the job with the number `job`.
+impl PartEntries {
+    /// Reads those of one of the `parts` of a job, or of the nodes above them. If its journal is not that of `header`, nothing is complete.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] if one cannot be read.
-    pub(crate) fn of(directory: &JobDirectory, job: u64) -> Result<PartJournals> {
-        let mut journals = Vec::new();
-        for folder in directory.folders_of_parts()? {
-            folder.probe()?;
-            let read = journal::read::<PartHeader, JobStep, StepRecord>(&folder)?;
-            if let Some((Some(header), entries)) = read.filter(|(found, _)| found.is_some_and(|found| found.job == job))
-            {
-                journals.push((folder, header, entries));
-            }
-        }
-        Ok(PartJournals(journals))
+    /// [`Error::Io`] if the journal cannot be read.
+    pub(crate) fn of(directory: &JobDirectory, parts: &Parts, header: PartHeader) -> Result<PartEntries> {
+        let directory = folder_of(directory, parts, header.part);
+        let found = PartEntries::find(&directory, |found| found == header)?;
+        Ok(found.unwrap_or(PartEntries { directory, header, entries: Vec::new() }))
     }
 
-    /// Returns the number of phases that are complete.
-    pub(crate) fn len(&self) -> u64 {
-        self.0.iter().map(|(_, _, entries)| entries.len() as u64).sum()
+    /// Reads those of all parts of the job with the number `job`, and of the nodes above them.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a journal cannot be read.
+    pub(crate) fn of_all(directory: &JobDirectory, job: u64) -> Result<Vec<PartEntries>> {
+        let found = directory.folders_of_parts()?.into_iter();
+        found.filter_map(|folder| PartEntries::find(&folder, |found| found.job == job).transpose()).collect()
     }
 
-    /// Returns the results that they name.
-    pub(crate) fn files(&self) -> impl Iterator<Item = &PublishedFile> {
-        self.0.iter().flat_map(|(_, _, entries)| entries).flat_map(|entry| &entry.files)
+    fn find(directory: &JobDirectory, is_own: impl Fn(PartHeader) -> bool) -> Result<Option<PartEntries>> {
+        // Another machine may have written it.
+        directory.probe()?;
+        let read = journal::read::<PartHeader, JobStep, StepRecord>(directory)?;
+        let Some((Some(header), entries)) = read.filter(|(found, _)| found.is_some_and(&is_own)) else {
+            return Ok(None);
+        };
+        Ok(Some(PartEntries { directory: directory.clone(), header, entries }))
     }
-}
 
-/// Opens the store in `directory` with these records.
-///
-/// # Errors
-/// [`sys::Error::Io`].
-pub(crate) fn open_store(directory: &JobDirectory, records: impl IntoIterator<Item = RecordRef>) -> Result<Store> {
-    let paths: [PathBuf; STORE_FILES] = directory.store();
-    Store::open(paths, records)
+    /// Tells whether `step` is complete.
+    pub(crate) fn has(&self, step: JobStep) -> bool {
+        self.entries.iter().any(|entry| entry.step == step)
+    }
+
+    /// Returns what is known of `step`, if it is complete.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if it is not understood.
+    pub(crate) fn done<T: DeserializeOwned>(&self, step: JobStep) -> Result<Option<Done<T>>> {
+        self.entries.iter().find(|entry| entry.step == step).map(JournalEntry::figures).transpose()
+    }
+
+    /// Returns the figures of `step`, if it is complete.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if they are not understood.
+    pub(crate) fn known<T: DeserializeOwned>(&self, step: JobStep) -> Result<Option<T>> {
+        Ok(self.done(step)?.map(|done| done.figures))
+    }
+
+    /// Returns the figures of `step`, which must be complete.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if it is not.
+    pub(crate) fn figures<T: DeserializeOwned>(&self, step: JobStep) -> Result<T> {
+        let missing = || Error::Broken(format!("part {} is not complete: {step:?} is missing", self.header.part));
+        self.known(step)?.ok_or_else(missing)
+    }
+
+    /// Returns the figures of all entries of `step`.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if they are not understood.
+    pub(crate) fn all_figures<T: DeserializeOwned>(&self, step: JobStep) -> Result<Vec<T>> {
+        let entries = self.entries.iter().filter(|entry| entry.step == step);
+        entries.map(|entry| entry.figures().map(|done: Done<T>| done.figures)).collect()
+    }
+
+    /// Returns the results of all phases, or of `step` alone.
+    pub(crate) fn files(&self, step: Option<JobStep>) -> impl Iterator<Item = &PublishedFile> {
+        let entries = self.entries.iter().filter(move |entry| step.is_none_or(|step| entry.step == step));
+        entries.flat_map(|entry| &entry.files)
+    }
+
+    /// Drops these steps. Returns whether one of them was complete.
+    pub(crate) fn drop_steps(&mut self, steps: &[JobStep]) -> bool {
+        let before = self.entries.len();
+        self.entries.retain(|entry| !steps.contains(&entry.step));
+        self.entries.len() < before
+    }
+
+    /// Tells whether all records and files hold what was written.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the disk does not tell.
+    pub(crate) fn is_whole(&self) -> Result<bool> {
+        let (store, records) = (self.store()?, records_of(&self.entries).into_values().collect::<Vec<_>>());
+        let is_whole = |record| {
+            interrupt::check()?;
+            store.is_whole(record)
+        };
+        let records = records.par_iter().map(is_whole).try_reduce(|| true, |a, b| Ok(a && b))?;
+        let files =
+            self.entries.par_iter().flat_map(|entry| &entry.files).map(|file| file.try_is_whole(&self.directory));
+        Ok(files.try_reduce(|| true, |a, b| Ok(a && b))? && records)
+    }
+
+    /// Opens the store that they describe.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(crate) fn store(&self) -> Result<Store> {
+        Store::open(self.directory.store(), records_of(&self.entries).into_values())
+    }
 }

@@ -3,6 +3,7 @@
 
 use crate::durable::atomic_file::remove_file;
 use crate::durable::directory::JobDirectory;
+use crate::durable::listing::entries;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use sys::{Error, Result, disk};
@@ -26,7 +27,7 @@ pub(crate) fn leave_note(directory: &JobDirectory, submission: u64) -> Result<()
 /// Returns the notes that are there, each with its submission.
 fn found(directory: &JobDirectory) -> Result<Vec<(PathBuf, u64)>> {
     // Some network file systems remember for a while that a file is not there, but not what is in a folder.
-    let there = disk::list(directory.job()).map_err(Error::io("read", directory.job()))?;
+    let there = entries(directory.job())?;
     Ok(there.into_iter().filter_map(|path| Some((submission_in(&path)?, path))).map(|(of, path)| (path, of)).collect())
 }
 

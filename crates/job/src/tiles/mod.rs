@@ -1,5 +1,6 @@
 //! Steps 5 and 6: finishes the normals on the borders of tiles, and writes the tiles.
 
+pub(crate) mod appearance;
 pub(crate) mod border_normals;
 pub(crate) mod clip_rule;
 pub(crate) mod curve;

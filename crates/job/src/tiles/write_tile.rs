@@ -21,7 +21,7 @@ use tiles::preview::canvas::Canvas;
 
 /// The figures of one tile, or the sum over all.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct TileStats {
+pub(crate) struct TileStats {
     /// GLB files written. A tile whose triangles all belong to others has none.
     pub files: u64,
     /// Triangles in them.

@@ -5,8 +5,7 @@ use crate::index::TileIndex;
 use crate::plan::job_plan::Claims;
 use crate::records::{Leaf, StepRecord, Store};
 use crate::run::job::Job;
-use crate::run::phases::part_store::PartStores;
-use crate::run::phases::tile_queue::TileAppearance;
+use crate::tiles::appearance::TileAppearance;
 use crate::tiles::max_edge::MaxEdgeRule;
 use delaunay::geometry::Bounds;
 use rayon::prelude::*;
@@ -43,14 +42,14 @@ pub(crate) fn early_appearance(job: &Job) -> Result<Option<Arc<TileAppearance>>>
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Broken`] on a store.
-pub(crate) fn count_sites(job: &Job, stores: &PartStores, all: SitesOfParts, store: &Store) -> Result<()> {
+pub(crate) fn count_sites(job: &Job, all: SitesOfParts, store: &Store) -> Result<()> {
     let choice = job.plan.options.output.max_edge;
     if choice != MaxEdge::Auto {
         return Ok(());
     }
     let visit = |visit: &(dyn Fn(&[i32; 3]) + Sync)| {
         job.parts.all().try_for_each(|part| {
-            let open = stores.open(part)?;
+            let open = job.open(part)?;
             let tiles: Vec<TileIndex> = open.partition.tree.tiles().collect();
             tiles.into_par_iter().try_for_each(|tile| Leaf::visit_positions(&open.store, tile, visit))
         })

@@ -1,6 +1,5 @@
 //! The merges above the parts.
 
-use crate::durable::journal::records_of;
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::merge_records::{HullCount, Seam, SeamOfTile};
 use crate::mesh::merge::merge_frontiers;
@@ -8,13 +7,11 @@ use crate::partition::tree::{NodeKind, Tree};
 use crate::plan::budget::merge_memory;
 use crate::progress::stats::StageStats;
 use crate::records::{JobStep, StepRecord, Store};
-use crate::run::done::Done;
 use crate::run::folder::{Folder, once};
-use crate::run::job::Job;
-use crate::run::part_entries::{entries_of, entry_of, open_store};
+use crate::run::job::{Job, OpenPart};
+use crate::run::part_entries::Done;
 use crate::run::phases::appearance::{SitesOfParts, count_sites, early_appearance, final_appearance};
-use crate::run::phases::part_store::{OpenPart, PartStores};
-use crate::run::phases::tile_queue::TileAppearance;
+use crate::tiles::appearance::TileAppearance;
 use crate::tiles::dependencies::FinishedTile;
 use crate::tiles::seam::seam_of;
 use serde::de::IgnoredAny;
@@ -45,16 +42,15 @@ fn is_needed(job: &Job) -> bool {
 ///
 /// # Errors
 /// Those of [`merge_frontiers`]; [`crate::Error::InUse`] if another process does it.
-pub(crate) fn join_parts(job: &Job, stores: &PartStores, all: SitesOfParts) -> crate::Result<()> {
+pub(crate) fn join_parts(job: &Job, all: SitesOfParts) -> crate::Result<()> {
     if !is_needed(job) {
         return Ok(());
     }
-    let directory = &job.directory.join();
-    once(job, directory, job.above(), JobStep::Join, key_of_meshes(job)?, |folder| {
+    once(job, job.above(), JobStep::Join, key_of_meshes(job)?, |folder| {
         let parts = job.parts.all().len() as u64;
         let stage = job.progress.stage("join", parts, "parts");
-        merge_below(job, stores, folder, NodeIndex::ROOT)?;
-        count_sites(job, stores, all, &folder.store)?;
+        merge_below(job, folder, NodeIndex::ROOT)?;
+        count_sites(job, all, &folder.store)?;
         stage.advance(parts);
         Ok(folder.record(JobStep::Join, all, vec![stage.finish()])?)
     })
@@ -68,9 +64,7 @@ fn key_of_meshes(job: &Job) -> Result<u64> {
     }
     let mut keys = Vec::new();
     for part in job.parts.all() {
-        if let Some(mesh) = entry_of(&job.directory.part(part), job.header(part), JobStep::Mesh)? {
-            keys.push(mesh.figures::<Done<IgnoredAny>>()?.key);
-        }
+        keys.extend(job.entries(part)?.done::<IgnoredAny>(JobStep::Mesh)?.map(|mesh| mesh.key));
     }
     Ok(xxh3_64(bytemuck::cast_slice(&keys)))
 }
@@ -80,15 +74,14 @@ fn key_of_meshes(job: &Job) -> Result<u64> {
 ///
 /// # Errors
 /// As [`join_parts`].
-pub(crate) fn merge_through(job: &Job, stores: &PartStores, last: PartIndex) -> crate::Result<Vec<TileIndex>> {
+pub(crate) fn merge_through(job: &Job, last: PartIndex) -> crate::Result<Vec<TileIndex>> {
     let complete = nodes_completed_by(&job.parts.tree, job.parts.node(last));
     if complete.is_empty() {
         return Ok(Vec::new());
     }
-    let directory = &job.directory.join();
-    let folder = Folder::open(job, directory, job.above())?;
+    let folder = Folder::open(job, job.above(), 0)?;
     // Nothing else goes on meanwhile.
-    let merges = complete.into_iter().map(|node| merge_at(job, stores, &folder, node, 1));
+    let merges = complete.into_iter().map(|node| merge_at(job, &folder, node, 1));
     Ok(merges.collect::<crate::Result<Vec<_>>>()?.concat())
 }
 
@@ -106,34 +99,28 @@ fn nodes_completed_by(tree: &Tree, leaf: NodeIndex) -> Vec<NodeIndex> {
 }
 
 /// Merges at all merge nodes at and below `node`, children first.
-fn merge_below(job: &Job, stores: &PartStores, folder: &Folder, node: NodeIndex) -> crate::Result<()> {
+fn merge_below(job: &Job, folder: &Folder, node: NodeIndex) -> crate::Result<()> {
     let tree = &job.parts.tree;
     let NodeKind::Inner([low, high]) = tree.node(node).kind else { return Ok(()) };
-    let below = |child| merge_below(job, stores, folder, child);
+    let below = |child| merge_below(job, folder, child);
     let (low, high) = rayon::join(|| below(low), || below(high));
     low.and(high)?;
     if !tree.is_merge(node) {
         return Ok(());
     }
-    merge_at(job, stores, folder, node, job.threads).map(|_| ())
+    merge_at(job, folder, node, job.threads).map(|_| ())
 }
 
 /// Merges at `node`, unless that is done, in the share of the memory that one of `threads` threads has. Returns the tiles that this
 /// finishes.
-fn merge_at(
-    job: &Job,
-    stores: &PartStores,
-    folder: &Folder,
-    node: NodeIndex,
-    threads: usize,
-) -> crate::Result<Vec<TileIndex>> {
+fn merge_at(job: &Job, folder: &Folder, node: NodeIndex, threads: usize) -> crate::Result<Vec<TileIndex>> {
     if let Some(finished) = folder.done(JobStep::Merge(node))? {
         return Ok(finished);
     }
     let tree = &job.parts.tree;
     let below = tree.merged_by(node);
     let open = |child: &NodeIndex| match tree.node(*child).kind {
-        NodeKind::Leaf(tile) => stores.open(tile.part()).map(Some),
+        NodeKind::Leaf(tile) => job.open(tile.part()).map(Some),
         NodeKind::Inner(_) => Ok(None),
     };
     let opened: Vec<Option<Arc<OpenPart>>> = below.iter().map(open).collect::<Result<_>>()?;
@@ -148,25 +135,23 @@ fn merge_at(
 }
 
 impl JoinedParts {
+    fn with(store: Option<Store>, appearance: Arc<TileAppearance>) -> JoinedParts {
+        JoinedParts { store, appearance, stages: Vec::new(), peak_memory: None, key_of_rule: 0 }
+    }
+
     /// Opens what [`join_parts`] has left; `None` if it is not complete.
     ///
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on its folder.
     pub(crate) fn open(job: &Job) -> Result<Option<JoinedParts>> {
         if let (false, Some(appearance)) = (is_needed(job), early_appearance(job)?) {
-            return Ok(Some(JoinedParts {
-                store: None,
-                appearance,
-                stages: Vec::new(),
-                peak_memory: None,
-                key_of_rule: 0,
-            }));
+            return Ok(Some(JoinedParts::with(None, appearance)));
         }
-        let directory = job.directory.join();
-        let entries = entries_of(&directory, job.header(job.above()))?;
-        let Some(entry) = entries.iter().find(|entry| entry.step == JobStep::Join) else { return Ok(None) };
-        let Done { figures: all, stages, peak_memory, .. } = entry.figures::<Done<SitesOfParts>>()?;
-        let store = open_store(&directory, records_of(&entries).into_values())?;
+        let entries = job.entries(job.above())?;
+        let Some(Done { figures: all, stages, peak_memory, .. }) = entries.done(JobStep::Join)? else {
+            return Ok(None);
+        };
+        let store = entries.store()?;
         let tree = &job.parts.tree;
         // Without the seam of a node, that node and those above it would be holes in the terrain.
         let merges = (0..tree.nodes.len()).map(NodeIndex::new).filter(|&node| tree.is_merge(node));
@@ -184,11 +169,8 @@ impl JoinedParts {
     /// # Errors
     /// As [`JoinedParts::open`].
     pub(crate) fn so_far(job: &Job, appearance: Arc<TileAppearance>) -> Result<JoinedParts> {
-        let directory = job.directory.join();
-        let entries = entries_of(&directory, job.header(job.above()))?;
-        let records = records_of(&entries).into_values();
-        let store = is_needed(job).then(|| open_store(&directory, records)).transpose()?;
-        Ok(JoinedParts { store, appearance, stages: Vec::new(), peak_memory: None, key_of_rule: 0 })
+        let store = is_needed(job).then(|| job.entries(job.above())?.store()).transpose()?;
+        Ok(JoinedParts::with(store, appearance))
     }
 
     /// Returns what all seams have of `tile` of the part with `store` and `tree`.
@@ -229,11 +211,11 @@ impl JoinedParts {
     ///
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a store.
-    pub(crate) fn hull_count(&self, job: &Job, stores: &PartStores) -> Result<HullCount> {
+    pub(crate) fn hull_count(&self, job: &Job) -> Result<HullCount> {
         match (&self.store, &job.parts.tree.node(NodeIndex::ROOT).kind) {
             (Some(store), NodeKind::Inner(_)) => Seam::hull_count(store, NodeIndex::ROOT),
             // The root of its tree is that of all.
-            _ => Seam::hull_count(&stores.open(PartIndex::FIRST)?.store, NodeIndex::ROOT),
+            _ => Seam::hull_count(&job.open(PartIndex::FIRST)?.store, NodeIndex::ROOT),
         }
     }
 }

@@ -6,14 +6,12 @@ use crate::levels::make_level::{LevelContext, LevelStats, TopOf, level_memory, m
 use crate::partition::result::Partition;
 use crate::plan::job_plan::Plan;
 use crate::records::JobStep;
-use crate::run::done::Done;
 use crate::run::folder::{Folder, done_with, once};
 use crate::run::job::Job;
 use crate::run::phases::join::JoinedParts;
 use crate::run::phases::outdated_levels::{
     MadeLevel, forget_outdated_levels, key_of_tiles, keys_of_levels, level_sizes,
 };
-use crate::run::phases::part_store::PartStores;
 use crate::tiles::style::TileStyle;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -26,22 +24,20 @@ use sys::{Error, Result, interrupt};
 /// Those of [`make_levels`]; [`crate::Error::InUse`] if another process has the part.
 pub(crate) fn levels_of_part(
     job: &Job,
-    stores: &PartStores,
     joined: &JoinedParts,
     part: PartIndex,
     has_tileset: bool,
 ) -> crate::Result<LevelStats> {
-    let directory = &job.directory.part(part);
     let key = key_of_tiles(job, &[part], has_tileset)?;
-    if let Some(done) = done_with(job, directory, part, JobStep::Levels, key)? {
-        return Ok(done);
+    if let Some(done) = done_with(job, part, JobStep::Levels, key)? {
+        return Ok(done.figures);
     }
-    let open = stores.open(part)?;
+    let open = job.open(part)?;
     // The store of the part grows, so what is open now must not be used again.
-    stores.close(part);
+    job.close(part);
     let hierarchy = hierarchy_of(job.plan, &open.partition);
-    forget_outdated_levels(job, directory, part, &hierarchy, has_tileset)?;
-    once(job, directory, part, JobStep::Levels, key, |folder| {
+    forget_outdated_levels(job, part, &hierarchy, has_tileset)?;
+    once(job, part, JobStep::Levels, key, |folder| {
         if !has_tileset {
             return Ok(folder.record(JobStep::Levels, LevelStats::default(), Vec::new())?);
         }
@@ -72,8 +68,7 @@ pub(crate) fn make_levels(
     let (output, sizes) = (&job.plan.options.output, level_sizes(job.plan));
     let keys = keys_of_levels(job, part, hierarchy)?;
     let Folder { directory, store, journal, .. } = folder;
-    let known: Vec<Done<Vec<MadeLevel>>> = journal.all_figures_of(JobStep::LevelTiles)?;
-    let known: Vec<MadeLevel> = known.into_iter().flat_map(|done| done.figures).collect();
+    let known: Vec<MadeLevel> = job.entries(part)?.all_figures::<Vec<MadeLevel>>(JobStep::LevelTiles)?.concat();
     let is_known: HashSet<NodeIndex> = known.iter().map(|made| made.node).collect();
     let stage = job.progress.stage("levels", (hierarchy.tiles.len() - is_known.len()) as u64, "tiles");
     let (meshes, keeps_meshes) = (output.levels, job.plan.options.updates);
@@ -126,17 +121,4 @@ fn batches(context: &LevelContext, tiles: Vec<usize>, threads: usize) -> Result<
         }
     }
     Ok([(small, threads), (large, ((context.sizes.memory / largest) as usize).clamp(1, threads))])
-}
-
-/// Returns what the user should know about coarser tiles without a mesh.
-pub(crate) fn left_out_warning(plan: &Plan, levels: &LevelStats) -> Option<String> {
-    (levels.left_out > 0).then(|| {
-        format!(
-            "{} of {} coarser tiles are left out for lack of memory ([limits] memory = \"{}\"): viewers load the finer ones at once; \
-             fix: more [limits] memory, or a lower [triangulation] max_points_per_tile",
-            levels.left_out,
-            levels.files + levels.left_out,
-            plan.options.limits.memory
-        )
-    })
 }

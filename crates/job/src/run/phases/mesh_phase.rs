@@ -3,20 +3,20 @@
 
 use crate::Result;
 use crate::durable::atomic_file::remove_file;
-use crate::durable::directory::JobDirectory;
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::mesh::leaf::LeafStats;
 use crate::partition::point_file::PointFiles;
 use crate::partition::result::Partition;
 use crate::progress::stats::StageStats;
-use crate::records::{JobStep, NewEntry, RecordChanges, StepRecord, Store};
+use crate::records::{JobStep, JournalEntry, RecordChanges, StepRecord, Store};
 use crate::run::folder::{Folder, once};
 use crate::run::job::Job;
-use crate::run::phases::meshed_part::{MeshedPart, SomeTiles};
+use crate::run::meshed_part::{MeshedPart, SomeTiles};
 use crate::run::phases::postponed_merges::PostponedMerges;
 use crate::run::phases::select_phase::{key_of_vertices, vertices_of};
-use crate::run::phases::tile_queue::{TileAppearance, TileQueue};
+use crate::run::phases::tile_queue::TileQueue;
 use crate::run::phases::tree_walk::TreeWalk;
+use crate::tiles::appearance::TileAppearance;
 use std::collections::HashSet;
 use std::sync::Arc;
 
@@ -31,12 +31,11 @@ pub(crate) fn mesh_one(
     appearance: Option<&Arc<TileAppearance>>,
     others: Option<u64>,
 ) -> Result<MeshedPart> {
-    let directory = &job.directory.part(part);
     let key = key_of_vertices(job, part)?;
-    let meshed = once(job, directory, part, JobStep::Mesh, key, |folder| mesh(job, folder, part, appearance, others))?;
+    let meshed = once(job, part, JobStep::Mesh, key, |folder| mesh(job, folder, part, appearance, others))?;
     match job.plan.options.updates {
-        true => remove_divided_points(job, directory)?,
-        false => directory.remove_points()?,
+        true => remove_divided_points(job, part)?,
+        false => job.folder(part).remove_points()?,
     }
     Ok(meshed)
 }
@@ -49,7 +48,7 @@ fn mesh(
     others: Option<u64>,
 ) -> Result<MeshedPart> {
     let max_points_per_tile = job.plan.options.triangulation.max_points_per_tile.0;
-    let partition = vertices_of(job, part, &folder.store)?.partition(folder.directory, max_points_per_tile)?;
+    let partition = vertices_of(job, part, &folder.store)?.partition(&folder.directory, max_points_per_tile)?;
     partition.save(&folder.store)?;
     let MeshInTiles { leaves, tiles, open, stages } = mesh_in_tiles(job, folder, &partition, appearance)?;
     let is_kept = job.plan.keeps_mesh();
@@ -69,18 +68,18 @@ fn mesh(
     let meshed = folder.done_now(meshed, stages);
     let [of_mesh, of_tiles] = by_style(folder.store.take_changes());
     // Another style needs the mesh, but not the tiles.
-    let mut entries = vec![NewEntry::new(JobStep::Mesh, &meshed, of_mesh)?];
+    let mut entries = vec![JournalEntry::new(JobStep::Mesh, &meshed, of_mesh)?];
     if appearance.is_some() {
-        entries.push(NewEntry::new(JobStep::Tiles, &folder.done_now(tiles, Vec::new()), of_tiles)?);
+        entries.push(JournalEntry::new(JobStep::Tiles, &folder.done_now(tiles, Vec::new()), of_tiles)?);
     }
     folder.record_all(entries)?;
     Ok(meshed.figures)
 }
 
 /// Removes the points of a part that no reader has written: those of crowded buckets, which are divided again, and the selected ones.
-fn remove_divided_points(job: &Job, directory: &JobDirectory) -> sys::Result<()> {
+fn remove_divided_points(job: &Job, part: PartIndex) -> sys::Result<()> {
     let readers = job.parts.all().len();
-    let written = directory.point_files()?.into_iter().filter(|(number, _)| usize::from(*number) >= readers);
+    let written = job.folder(part).point_files()?.into_iter().filter(|(number, _)| usize::from(*number) >= readers);
     written.into_iter().try_for_each(|(_, path)| remove_file(&path))
 }
 

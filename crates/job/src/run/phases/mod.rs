@@ -8,11 +8,9 @@ pub(crate) mod appearance;
 pub(crate) mod join;
 pub(crate) mod level_phase;
 pub(crate) mod mesh_phase;
-pub(crate) mod meshed_part;
 mod outdated_levels;
 mod outdated_tiles;
 pub(crate) mod part_progress;
-pub(crate) mod part_store;
 pub(crate) mod plan_phase;
 mod postponed_merges;
 pub(crate) mod publish_phase;
@@ -29,17 +27,17 @@ use crate::index::PartIndex;
 use crate::partition::part_points::ReadInputs;
 use crate::partition::parts::Parts;
 use crate::plan::job_plan::Plan;
+use crate::publish::written_tiles::wants_tileset;
 use crate::report::job_report::Report;
 use crate::run::job::Job;
+use crate::run::meshed_part::MeshedPart;
 use crate::run::phases::appearance::{SitesOfParts, early_appearance};
 use crate::run::phases::join::{JoinedParts, join_parts};
 use crate::run::phases::level_phase::levels_of_part;
 use crate::run::phases::mesh_phase::mesh_one;
-use crate::run::phases::meshed_part::MeshedPart;
 use crate::run::phases::outdated_tiles::forget_outdated_tiles;
-use crate::run::phases::part_store::PartStores;
 use crate::run::phases::plan_phase::settled;
-use crate::run::phases::publish_phase::{publish_job, wants_tileset};
+use crate::run::phases::publish_phase::publish_job;
 use crate::run::phases::read_phase::{read_for, sum_up};
 use crate::run::phases::select_phase::{select_vertices, selects};
 use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
@@ -57,32 +55,31 @@ pub(crate) fn do_phases(run: &WholeRun, plan: Plan) -> Result<Report> {
     // Step 1, and step 2 where one part reads all.
     let plan = &settled(run, plan)?;
     let parts = &Parts::of(plan);
-    let job = &run.job(plan, parts);
+    let job = &Job::new(run.process, plan, parts);
     if parts.all().len() > 1 {
-        keep_first_plan(run.directory, plan)?;
+        keep_first_plan(job.directory, plan)?;
     }
     // Steps 2 to 6 for each part, as far as it needs no later one.
-    let stores = &PartStores::new(job);
-    let all = read_and_mesh(job, stores)?;
+    let all = read_and_mesh(job)?;
     // Step 4 for the nodes above the parts.
-    join_parts(job, stores, all)?;
+    join_parts(job, all)?;
     let joined = JoinedParts::open(job)?.ok_or_else(|| sys::Error::Broken("the parts are not joined".into()))?;
-    forget_outdated_tiles(job, stores, &joined)?;
+    forget_outdated_tiles(job, &joined)?;
     // Steps 5 and 6 for the tiles that have waited.
-    let borders = &ForeignBorders::new(job, stores, &joined);
+    let borders = &ForeignBorders::new(job, &joined);
     let mut tiles = TileStats::default();
     for part in parts.all() {
         tiles += finish_part(borders, part)?;
     }
     // Step 7 for each part.
     let has_tileset = wants_tileset(plan, &tiles);
-    parts.all().try_for_each(|part| levels_of_part(job, stores, &joined, part, has_tileset).map(|_| ()))?;
+    parts.all().try_for_each(|part| levels_of_part(job, &joined, part, has_tileset).map(|_| ()))?;
     // Step 7 above the parts, and step 8.
-    publish_job(run, job, stores, &joined)
+    publish_job(run, job, &joined)
 }
 
 /// Reads and meshes all parts, or those that an interrupted run left. Returns what all of them hold.
-fn read_and_mesh(job: &Job, stores: &PartStores) -> Result<SitesOfParts> {
+fn read_and_mesh(job: &Job) -> Result<SitesOfParts> {
     let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
     // Bytes of points that wait, by part.
     let mut waiting = vec![0; job.parts.all().len()];
@@ -103,7 +100,7 @@ fn read_and_mesh(job: &Job, stores: &PartStores) -> Result<SitesOfParts> {
     let appearance = early_appearance(job)?;
     // A job with `--update` keeps everything, and compares the tiles that wait with those of its last run.
     let waits = appearance.clone().filter(|_| !job.plan.options.updates);
-    let mut front = waits.map(|appearance| WaitingTiles::new(job, stores, appearance));
+    let mut front = waits.map(|appearance| WaitingTiles::new(job, appearance));
     for part in job.parts.all() {
         if !selects {
             read_next(part, &mut read, &mut waiting)?;

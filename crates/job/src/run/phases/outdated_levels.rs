@@ -1,17 +1,13 @@
 //! Coarser tiles of an update: those stay whose finer tiles are as they were.
 
 use crate::Result;
-use crate::durable::atomic_file::remove_file;
-use crate::durable::directory::JobDirectory;
-use crate::durable::journal::PublishedFile;
 use crate::index::{NodeIndex, PartIndex};
 use crate::levels::hierarchy::{ChildTile, Hierarchy, LevelSizes};
 use crate::levels::make_level::LevelStats;
 use crate::plan::job_plan::Plan;
-use crate::records::{JobStep, Journal, JournalEntry, StepRecord};
-use crate::run::done::Done;
+use crate::records::{JobStep, StepRecord};
 use crate::run::job::Job;
-use crate::run::part_entries::entries_of;
+use crate::run::part_entries::Done;
 use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -38,8 +34,8 @@ pub(crate) fn key_of_tiles(job: &Job, parts: &[PartIndex], has_tileset: bool) ->
     }
     let mut hasher = hasher_of_levels(job, has_tileset);
     for &part in parts {
-        let entries = entries_of(&job.directory.part(part), job.header(part))?;
-        let mut files: Vec<&PublishedFile> = files_of_tiles(&entries).collect();
+        let entries = job.entries(part)?;
+        let mut files: Vec<_> = entries.files(Some(JobStep::Tiles)).collect();
         files.sort_unstable_by(|a, b| a.name.cmp(&b.name));
         let lines = files.into_iter().map(|file| format!("{} {}\n", file.name.display(), file.checksum));
         lines.for_each(|line| hasher.update(line.as_bytes()));
@@ -60,10 +56,6 @@ pub(crate) fn level_sizes(plan: &Plan) -> LevelSizes {
     LevelSizes::new(plan.options.output.max_points_per_level_tile.0, plan.options.limits.memory.0)
 }
 
-fn files_of_tiles(entries: &[JournalEntry]) -> impl Iterator<Item = &PublishedFile> {
-    entries.iter().filter(|entry| entry.step == JobStep::Tiles).flat_map(|entry| &entry.files)
-}
-
 /// Returns the key of each coarser tile of `hierarchy`, which is that of `part`, with `--update`; none else.
 ///
 /// # Errors
@@ -72,9 +64,9 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
     if !job.plan.options.updates {
         return Ok(Vec::new());
     }
-    let entries = entries_of(&job.directory.part(part), job.header(part))?;
-    let checksums: HashMap<&Path, Checksum> =
-        files_of_tiles(&entries).map(|file| (file.name.as_path(), file.checksum)).collect();
+    let entries = job.entries(part)?;
+    let files = entries.files(Some(JobStep::Tiles));
+    let checksums: HashMap<&Path, Checksum> = files.map(|file| (file.name.as_path(), file.checksum)).collect();
     let mut keys = vec![0u64; hierarchy.tiles.len()];
     for index in hierarchy.by_height().into_iter().flatten() {
         let mut hasher = hasher_of_levels(job, true);
@@ -95,13 +87,12 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
 }
 
 /// With `--update`, takes the coarser tiles whose finer tiles are others now out of the journal of `part`, or of the nodes
-/// above the parts, whose folder is `directory`; all of them unless the job `has_tileset`.
+/// above the parts; all of them unless the job `has_tileset`.
 ///
 /// # Errors
 /// [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
 pub(crate) fn forget_outdated_levels(
     job: &Job,
-    directory: &JobDirectory,
     part: PartIndex,
     hierarchy: &Hierarchy,
     has_tileset: bool,
@@ -112,25 +103,19 @@ pub(crate) fn forget_outdated_levels(
     let keys = if has_tileset { keys_of_levels(job, part, hierarchy)? } else { Vec::new() };
     let keys: HashMap<NodeIndex, u64> = hierarchy.tiles.iter().map(|tile| tile.node).zip(keys).collect();
     let is_whole = |made: &MadeLevel| keys.get(&made.node) == Some(&made.key);
-    let _lock = directory.lock_within()?;
-    let (mut outdated, mut kept) = (HashSet::<PathBuf>::new(), Vec::new());
-    for mut entry in entries_of(directory, job.header(part))?.into_iter().filter(|entry| entry.step != JobStep::Levels)
-    {
-        if entry.step == JobStep::LevelTiles {
-            let mut done = entry.figures::<Done<Vec<MadeLevel>>>()?;
-            let gone: HashSet<NodeIndex> =
-                done.figures.iter().filter(|made| !is_whole(made)).map(|made| made.node).collect();
-            let name = |node: &NodeIndex| directory.name(&directory.output().level(part.node_number(*node)));
-            let names: HashSet<PathBuf> = gone.iter().map(name).collect();
-            done.figures.retain(is_whole);
-            entry.files.retain(|file| !names.contains(&file.name));
-            let is_of_gone = |key: StepRecord| matches!(key, StepRecord::Level(node) | StepRecord::LevelMesh(node) if gone.contains(&node));
-            entry.changes.written.retain(|record| !is_of_gone(record.key()));
-            entry = entry.with_figures(&done)?;
-            outdated.extend(names);
+    job.rewrite(part, |mut entry| {
+        if entry.step != JobStep::LevelTiles {
+            return Ok((entry.step != JobStep::Levels).then_some(entry));
         }
-        kept.push(entry);
-    }
-    drop(Journal::begin(directory, &job.header(part), kept)?);
-    Ok(outdated.iter().try_for_each(|name| remove_file(&directory.file(name)))?)
+        let mut done = entry.figures::<Done<Vec<MadeLevel>>>()?;
+        let gone: HashSet<NodeIndex> =
+            done.figures.iter().filter(|made| !is_whole(made)).map(|made| made.node).collect();
+        let name = |node: &NodeIndex| job.directory.name(&job.directory.output().level(part.node_number(*node)));
+        let names: HashSet<PathBuf> = gone.iter().map(name).collect();
+        done.figures.retain(is_whole);
+        entry.files.retain(|file| !names.contains(&file.name));
+        let is_of_gone = |key: StepRecord| matches!(key, StepRecord::Level(node) | StepRecord::LevelMesh(node) if gone.contains(&node));
+        entry.changes.written.retain(|record| !is_of_gone(record.key()));
+        entry.with_figures(&done).map(Some)
+    })
 }

@@ -2,16 +2,12 @@
 //! neighbours whose borders they show.
 
 use crate::Result;
-use crate::durable::atomic_file::remove_file;
-use crate::durable::directory::JobDirectory;
 use crate::index::{PartIndex, TileIndex};
-use crate::records::{JobStep, Journal, JournalEntry, StepRecord};
-use crate::run::done::Done;
+use crate::records::{JobStep, JournalEntry, StepRecord};
 use crate::run::job::Job;
-use crate::run::part_entries::entries_of;
+use crate::run::meshed_part::{SomeTiles, WaitedTile};
+use crate::run::part_entries::Done;
 use crate::run::phases::join::JoinedParts;
-use crate::run::phases::meshed_part::{SomeTiles, WaitedTile, tiles_so_far};
-use crate::run::phases::part_store::PartStores;
 use crate::tiles::write_tile::TileStats;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -21,12 +17,12 @@ use std::path::PathBuf;
 ///
 /// # Errors
 /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a folder, [`crate::Error::InUse`] if another process has one.
-pub(crate) fn forget_outdated_tiles(job: &Job, stores: &PartStores, joined: &JoinedParts) -> Result<()> {
+pub(crate) fn forget_outdated_tiles(job: &Job, joined: &JoinedParts) -> Result<()> {
     if !job.plan.options.updates {
         return Ok(());
     }
     let parts: Vec<PartIndex> = job.parts.all().collect();
-    let tiles_of = |&part: &PartIndex| tiles_so_far(&entries_of(&job.directory.part(part), job.header(part))?);
+    let tiles_of = |&part: &PartIndex| SomeTiles::of(&job.entries(part)?);
     let known = parts.par_iter().map(tiles_of).collect::<sys::Result<Vec<SomeTiles>>>()?;
     let written: HashSet<TileIndex> = known.iter().flat_map(|tiles| &tiles.written).copied().collect();
     let waited: Vec<&WaitedTile> = known.iter().flat_map(|tiles| &tiles.waited).collect();
@@ -40,7 +36,6 @@ pub(crate) fn forget_outdated_tiles(job: &Job, stores: &PartStores, joined: &Joi
         let outdated = tiles.waited.iter().filter(|tile| is_other(&tile.tile) || tile.neighbours.iter().any(is_other));
         let outdated: HashSet<TileIndex> = outdated.map(|tile| tile.tile).collect();
         if !outdated.is_empty() {
-            stores.close(part);
             forget_tiles(job, part, &outdated)?;
         }
     }
@@ -48,23 +43,13 @@ pub(crate) fn forget_outdated_tiles(job: &Job, stores: &PartStores, joined: &Joi
 }
 
 fn forget_tiles(job: &Job, part: PartIndex, outdated: &HashSet<TileIndex>) -> Result<()> {
-    let directory = job.directory.part(part);
-    let _lock = directory.lock_within()?;
-    let names: HashSet<PathBuf> = outdated.iter().flat_map(|&tile| names_of(&directory, tile)).collect();
-    let entries = entries_of(&directory, job.header(part))?.into_iter();
-    let without = |entry: JournalEntry| match entry.step {
-        JobStep::Tiles => without(entry, outdated, &names),
-        _ => Ok(entry),
-    };
-    drop(Journal::begin(&directory, &job.header(part), entries.map(without).collect::<sys::Result<Vec<_>>>()?)?);
-    // A result in its place is another link to the same file, which stays.
-    Ok(names.iter().try_for_each(|name| remove_file(&directory.file(name)))?)
-}
-
-/// Returns the names of the results of a tile.
-fn names_of(directory: &JobDirectory, tile: TileIndex) -> [PathBuf; 2] {
-    let output = directory.output();
-    [output.tile(tile.number()), output.cut_tile(tile.number())].map(|path| directory.name(&path))
+    let output = job.directory.output();
+    let paths = outdated.iter().flat_map(|tile| [output.tile(tile.number()), output.cut_tile(tile.number())]);
+    let names = paths.map(|path| job.directory.name(&path)).collect();
+    job.rewrite(part, |entry| match entry.step {
+        JobStep::Tiles => without(entry, outdated, &names).map(Some),
+        _ => Ok(Some(entry)),
+    })
 }
 
 /// Returns the entry without these tiles, whose results have these `names`.

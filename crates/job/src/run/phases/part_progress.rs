@@ -1,17 +1,15 @@
 //! What the journals of parts say of phases that are complete.
 
-use crate::durable::directory::JobDirectory;
 use crate::durable::journal::records_of;
 use crate::levels::make_level::LevelStats;
 use crate::partition::part_points::ReadInputs;
 use crate::phase::Phase;
 use crate::progress::stats::StageStats;
-use crate::records::{JobStep, JournalEntry, RecordRef};
-use crate::run::done::Done;
-use crate::run::part_entries::{PartHeader, entries_of};
-use crate::run::phases::meshed_part::{MeshedPart, SomeTiles};
+use crate::records::{JobStep, RecordRef};
+use crate::run::meshed_part::{MeshedPart, SomeTiles};
+use crate::run::part_entries::{Done, PartEntries};
 use crate::run::phases::select_phase::SelectedPart;
-use serde::de::{DeserializeOwned, IgnoredAny};
+use serde::de::IgnoredAny;
 use sys::Result;
 
 /// The phases of a part that are complete.
@@ -30,29 +28,20 @@ pub(crate) struct PartProgress {
 }
 
 impl PartProgress {
-    /// Reads the journal in `directory`, which is that of the part with `header`.
+    /// Returns what the `entries` of the part tell.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the journal.
-    pub(crate) fn of(directory: &JobDirectory, header: PartHeader) -> Result<PartProgress> {
-        let entries = entries_of(directory, header)?;
-        let stored = records_of(&entries).values().map(RecordRef::bytes).sum();
-        let mut progress = PartProgress { stored, ..PartProgress::default() };
-        for entry in entries {
-            fn figures<T: DeserializeOwned>(entry: &JournalEntry) -> Result<T> {
-                entry.figures::<Done<T>>().map(|done| done.figures)
-            }
-            match entry.step {
-                JobStep::Read => progress.read = Some(figures(&entry)?),
-                JobStep::Select => progress.selected = Some(figures(&entry)?),
-                JobStep::Mesh => progress.mesh = Some(figures(&entry)?),
-                JobStep::Tiles => progress.tiles.add(figures(&entry)?),
-                JobStep::Levels => progress.levels = Some(figures(&entry)?),
-                _ => {}
-            }
-            progress.costs.push((entry.step, entry.figures()?));
-        }
-        Ok(progress)
+    /// [`sys::Error::Broken`] if they are not understood.
+    pub(crate) fn of(entries: &PartEntries) -> Result<PartProgress> {
+        Ok(PartProgress {
+            read: entries.known(JobStep::Read)?,
+            selected: entries.known(JobStep::Select)?,
+            mesh: entries.known(JobStep::Mesh)?,
+            tiles: SomeTiles::of(entries)?,
+            levels: entries.known(JobStep::Levels)?,
+            stored: records_of(&entries.entries).values().map(RecordRef::bytes).sum(),
+            costs: entries.entries.iter().map(|entry| Ok((entry.step, entry.figures()?))).collect::<Result<_>>()?,
+        })
     }
 
     /// Tells whether `phase` is complete.

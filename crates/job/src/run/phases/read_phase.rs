@@ -1,6 +1,5 @@
 //! Reading the inputs, each by the first part that needs it.
 
-use crate::durable::journal::records_of;
 use crate::index::PartIndex;
 use crate::mesh::precision_limit::PrecisionLimit;
 use crate::partition::part_points::{PointsOfPart, ReadInputs, check_malformed, read_inputs};
@@ -8,10 +7,8 @@ use crate::partition::result::PointSummary;
 use crate::plan::area_hint::stretch_of_read;
 use crate::plan::no_points::no_point_is_left;
 use crate::records::JobStep;
-use crate::run::done::Done;
 use crate::run::folder::once;
 use crate::run::job::Job;
-use crate::run::part_entries::{entries_of, entry_of, open_store};
 use crate::run::update::outdated::forget_from;
 use crate::{Error, Result};
 use delaunay::geometry::Bounds;
@@ -22,14 +19,14 @@ use delaunay::geometry::Bounds;
 /// Those of [`read_inputs`]; [`Error::InUse`] if another process has the folder.
 pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<ReadInputs> {
     let Job { plan, parts, .. } = *job;
-    let (inputs, directory) = (parts.new_inputs(reader), &job.directory.part(reader));
+    let inputs = parts.new_inputs(reader);
     if inputs.is_empty() {
-        if plan.options.updates && entry_of(directory, job.header(reader), JobStep::Read)?.is_some() {
-            forget_from(job, directory, reader, JobStep::Read)?;
+        if plan.options.updates && job.entries(reader)?.has(JobStep::Read) {
+            forget_from(job, reader, JobStep::Read)?;
         }
         return Ok(ReadInputs::default());
     }
-    once(job, directory, reader, JobStep::Read, plan.key_of_inputs(inputs), |folder| {
+    once(job, reader, JobStep::Read, plan.key_of_inputs(inputs), |folder| {
         let records = inputs.iter().map(|&input| plan.inputs[input].source.records).sum();
         let stage = job.progress.stage("read", records, "points");
         let (read, blocks) = read_inputs(plan, parts, job.directory, reader, malformed, job.syncs(), &stage)?;
@@ -44,7 +41,7 @@ pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<R
 /// [`Error::DamagedSteps`] if points are damaged, [`sys::Error::Io`] if what a reader wrote down cannot be read.
 pub(crate) fn points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPart<'a>> {
     let points = listed_points_of(job, part)?;
-    if job.checks_points && !points.are_whole(&job.directory.part(part))? {
+    if job.checks_points && !points.are_whole(&job.folder(part))? {
         return Err(Error::DamagedSteps);
     }
     Ok(points)
@@ -57,12 +54,8 @@ pub(crate) fn points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPa
 pub(crate) fn listed_points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPart<'a>> {
     let mut points = PointsOfPart::none(job.plan, job.parts, part);
     for reader in job.parts.readers_of(part) {
-        let directory = job.directory.part(reader);
-        let entries = entries_of(&directory, job.header(reader))?;
-        let read = entries.iter().find(|entry| entry.step == JobStep::Read);
-        let read = read.ok_or_else(|| sys::Error::Broken(format!("the inputs of part {reader} were not read")))?;
-        let store = open_store(&directory, records_of(&entries).into_values())?;
-        points.add(reader, &store, &read.figures::<Done<ReadInputs>>()?.figures)?;
+        let entries = job.entries(reader)?;
+        points.add(reader, &entries.store()?, &entries.figures(JobStep::Read)?)?;
     }
     Ok(points)
 }

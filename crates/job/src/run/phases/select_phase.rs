@@ -2,8 +2,6 @@
 //! meshed.
 
 use crate::durable::columns::{ColumnReader, ColumnWriter};
-use crate::durable::directory::JobDirectory;
-use crate::durable::journal::records_of;
 use crate::index::PartIndex;
 use crate::mesh::hull_rule::HullRule;
 use crate::mesh::selection::{PartInBlocks, PointsInBlocks, WrittenPoints, error_bound, points_per_block};
@@ -11,10 +9,8 @@ use crate::partition::part_points::{PointsOfPart, file_of_selected};
 use crate::plan::budget::working_memory;
 use crate::plan::job_plan::Plan;
 use crate::records::{JobStep, StepRecord, Store};
-use crate::run::done::Done;
 use crate::run::folder::{Folder, done_with};
 use crate::run::job::Job;
-use crate::run::part_entries::{entries_of, entry_of, open_store};
 use crate::run::phases::read_phase::{listed_points_of, points_of};
 use crate::{Error, Result};
 use delaunay::geometry::Site;
@@ -55,21 +51,18 @@ pub(crate) fn selects(plan: &Plan) -> bool {
 pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     let bound = error_bound(job.plan)?;
     let key = key_of_all_points(job)?;
-    let is_done = |part| {
-        done_with::<IgnoredAny>(job, &job.directory.part(part), part, JobStep::Select, key).map(|done| done.is_some())
-    };
+    let is_done = |part| Ok(done_with::<IgnoredAny>(job, part, JobStep::Select, key)?.is_some());
     if job.parts.all().map(is_done).collect::<Result<Vec<bool>>>()?.into_iter().all(|is_done| is_done) {
         return know_selection(job);
     }
-    let directories: Vec<JobDirectory> = job.parts.all().map(|part| job.directory.part(part)).collect();
     // The lock of the first part is that of the phase: no other phase goes on before this one is done.
-    let first = Folder::open(job, &directories[0], PartIndex::FIRST)?.with_key(key);
+    let first = Folder::open(job, PartIndex::FIRST, key)?;
     let stage = job.progress.stage("select", job.plan.decoded_records(), "points");
     let memory = working_memory(&job.plan.options);
     let per_block = points_per_block(job.plan.decoded_records(), memory, job.threads);
     let in_blocks = |part: PartIndex| {
-        let directory = &directories[part.get()];
-        let partition = points_of(job, part)?.partition(directory, per_block)?;
+        let directory = job.folder(part);
+        let partition = points_of(job, part)?.partition(&directory, per_block)?;
         let mut files = directory.point_files()?;
         files.retain(|(number, _)| *number != file_of_selected(job.parts));
         Ok(PartInBlocks { part, partition, files })
@@ -90,14 +83,13 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     let mut stage = Some(stage);
     let mut temporary = parts.iter().map(|part| part.partition.point_bytes).sum();
     for (number, PartInBlocks { part, .. }) in parts.iter().enumerate() {
-        let other =
-            if number == 0 { None } else { Some(Folder::open(job, &directories[number], *part)?.with_key(key)) };
+        let other = if number == 0 { None } else { Some(Folder::open(job, *part, key)?) };
         let folder = other.as_ref().unwrap_or(&first);
         if folder.done::<SelectedPart>(JobStep::Select)?.is_some() {
             continue;
         }
         let WrittenPoints { blocks, wanted, duplicates, digest } =
-            source.write_selected(number, sites.as_ref(), job.parts, &directories[number], job.syncs())?;
+            source.write_selected(number, sites.as_ref(), job.parts, &folder.directory, job.syncs())?;
         blocks.save_as(&folder.store, StepRecord::Selected)?;
         if number == 0 {
             ColumnWriter::default().push(&on_ground).write(&folder.store, StepRecord::OnGround)?;
@@ -132,11 +124,9 @@ fn key_of_all_points(job: &Job) -> Result<u64> {
 /// # Errors
 /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store of the first part.
 pub(crate) fn know_selection(job: &Job) -> Result<()> {
-    let directory = job.directory.part(PartIndex::FIRST);
-    let entries = entries_of(&directory, job.header(PartIndex::FIRST))?;
-    if entries.iter().any(|entry| entry.step == JobStep::Select) {
-        let store = open_store(&directory, records_of(&entries).into_values())?;
-        let on_ground = ColumnReader::open(&store, StepRecord::OnGround)?.column::<[Site; 3]>()?;
+    let entries = job.entries(PartIndex::FIRST)?;
+    if entries.has(JobStep::Select) {
+        let on_ground = ColumnReader::open(&entries.store()?, StepRecord::OnGround)?.column::<[Site; 3]>()?;
         job.plan.on_ground.set(on_ground.iter().copied());
     }
     Ok(())
@@ -147,9 +137,7 @@ pub(crate) fn know_selection(job: &Job) -> Result<()> {
 /// # Errors
 /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store of the first part.
 pub(crate) fn found_ground(job: &Job) -> sys::Result<Ground> {
-    let directory = job.directory.part(PartIndex::FIRST);
-    let entries = entries_of(&directory, job.header(PartIndex::FIRST))?;
-    let store = open_store(&directory, records_of(&entries).into_values())?;
+    let store = job.entries(PartIndex::FIRST)?.store()?;
     let mut columns = ColumnReader::open(&store, StepRecord::Ground)?;
     let (numbers, places) = (columns.column_vec()?, columns.column_vec()?);
     let read = |range: Range<usize>| {
@@ -190,9 +178,7 @@ pub(crate) fn key_of_vertices(job: &Job, part: PartIndex) -> Result<u64> {
 
 /// Returns what is known of a part whose vertices are selected.
 fn selected_part(job: &Job, part: PartIndex) -> sys::Result<SelectedPart> {
-    let entry = entry_of(&job.directory.part(part), job.header(part), JobStep::Select)?;
-    let entry = entry.ok_or_else(|| sys::Error::Broken(format!("the vertices of part {part} are not selected")))?;
-    Ok(entry.figures::<Done<SelectedPart>>()?.figures)
+    job.entries(part)?.figures(JobStep::Select)
 }
 
 /// Returns the points of a part that are vertices: all, or those that are selected. `store` is that of the part.
@@ -203,10 +189,9 @@ pub(crate) fn vertices_of<'a>(job: &Job<'a>, part: PartIndex, store: &Store) -> 
     if !selects(job.plan) {
         return points_of(job, part);
     }
-    let directory = &job.directory.part(part);
     let blocks = selected_part(job, part)?.blocks;
     let points = PointsOfPart::none(job.plan, job.parts, part).selected(store, blocks)?;
-    if job.checks_points && !points.are_whole(directory)? {
+    if job.checks_points && !points.are_whole(&job.folder(part))? {
         return Err(Error::DamagedSteps);
     }
     Ok(points)

@@ -1,6 +1,5 @@
 //! Steps 5 and 6 for tiles of parts that have waited for other parts.
 
-use crate::durable::directory::JobDirectory;
 use crate::index::{PartIndex, TileIndex};
 use crate::merge_records::SeamOfTile;
 use crate::partition::result::Partition;
@@ -8,12 +7,11 @@ use crate::phase::Phase;
 use crate::progress::stage::Stage;
 use crate::records::{FinishedBorder, JobStep, StepRecord, Store};
 use crate::run::folder::Folder;
-use crate::run::job::Job;
+use crate::run::job::{Job, OpenPart};
+use crate::run::meshed_part::{SomeTiles, WaitedTile};
 use crate::run::phases::join::JoinedParts;
-use crate::run::phases::meshed_part::{SomeTiles, WaitedTile};
 use crate::run::phases::part_progress::PartProgress;
-use crate::run::phases::part_store::{OpenPart, PartStores};
-use crate::run::phases::tile_queue::TileAppearance;
+use crate::tiles::appearance::TileAppearance;
 use crate::tiles::border_normals::{finish_border_normals, finished_border};
 use crate::tiles::write_tile::{TileStats, write_tile};
 use rayon::prelude::*;
@@ -26,12 +24,12 @@ use sys::{Result, interrupt};
 /// # Errors
 /// Those of the steps; [`crate::Error::InUse`] if another process has the part.
 pub(crate) fn finish_part(borders: &ForeignBorders, part: PartIndex) -> crate::Result<TileStats> {
-    let (job, directory) = (borders.job, &borders.job.directory.part(part));
-    let progress = PartProgress::of(directory, job.header(part))?;
+    let job = borders.job;
+    let progress = PartProgress::of(&job.entries(part)?)?;
     if progress.has(Phase::Tiles) {
         return Ok(progress.tiles.stats);
     }
-    let session = BorderSession::open(borders, directory, part, progress.tiles_left())?;
+    let session = BorderSession::open(borders, part, progress.tiles_left())?;
     // What another process has written since is in the journal that is locked now.
     let SomeTiles { stats: mut all, written, with_border, .. } = session.open.tiles.clone();
     let written: HashSet<TileIndex> = written.into_iter().collect();
@@ -63,7 +61,7 @@ pub(crate) fn finish_part(borders: &ForeignBorders, part: PartIndex) -> crate::R
 /// A part whose waiting tiles this process writes.
 pub(crate) struct BorderSession<'a> {
     borders: &'a ForeignBorders<'a>,
-    folder: Folder<'a>,
+    folder: Folder,
     open: Arc<OpenPart>,
     part: PartIndex,
     stage: Stage,
@@ -76,16 +74,15 @@ impl<'a> BorderSession<'a> {
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the folder, [`crate::Error::InUse`] if another process has the part.
     pub(crate) fn open(
         borders: &'a ForeignBorders<'a>,
-        directory: &'a JobDirectory,
         part: PartIndex,
         tiles: usize,
     ) -> crate::Result<BorderSession<'a>> {
-        let ForeignBorders { job, stores, .. } = *borders;
-        let folder = Folder::open(job, directory, part)?;
+        let job = borders.job;
+        let folder = Folder::open(job, part, 0)?;
         // What was opened before may be from before another process wrote here, and the store grows from now on.
-        stores.close(part);
-        let open = stores.open(part)?;
-        stores.close(part);
+        job.close(part);
+        let open = job.open(part)?;
+        job.close(part);
         let stage = job.progress.stage("write tiles", tiles as u64, "tiles");
         Ok(BorderSession { borders, folder, open, part, stage })
     }
@@ -166,15 +163,14 @@ const MOST_KNOWN: usize = 1000;
 /// Finished borders of tiles of other parts. Those that are not stored yet are computed: a part's folder has one writer.
 pub(crate) struct ForeignBorders<'a> {
     job: &'a Job<'a>,
-    stores: &'a PartStores,
     joined: &'a JoinedParts,
     known: Mutex<HashMap<TileIndex, FinishedBorder>>,
 }
 
 impl<'a> ForeignBorders<'a> {
     /// Returns the borders of a job whose parts are joined as far as `joined` tells.
-    pub(crate) fn new(job: &'a Job<'a>, stores: &'a PartStores, joined: &'a JoinedParts) -> ForeignBorders<'a> {
-        ForeignBorders { job, stores, joined, known: Mutex::default() }
+    pub(crate) fn new(job: &'a Job<'a>, joined: &'a JoinedParts) -> ForeignBorders<'a> {
+        ForeignBorders { job, joined, known: Mutex::default() }
     }
 
     fn of(&self, tile: TileIndex) -> Result<FinishedBorder> {
@@ -192,7 +188,7 @@ impl<'a> ForeignBorders<'a> {
     }
 
     fn find(&self, tile: TileIndex) -> Result<FinishedBorder> {
-        let OpenPart { store, partition, .. } = &*self.stores.open(tile.part())?;
+        let OpenPart { store, partition, .. } = &*self.job.open(tile.part())?;
         // Another machine may be writing it. But what a written tile needed may be gone, and then it is whole.
         if store.has_whole(StepRecord::FinishedBorder(tile))? {
             return FinishedBorder::load(store, tile);

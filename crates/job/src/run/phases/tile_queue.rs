@@ -2,33 +2,28 @@
 
 use crate::index::TileIndex;
 use crate::partition::result::Partition;
-use crate::plan::job_plan::Plan;
 use crate::progress::activity::Activity;
 use crate::progress::stage::Stage;
 use crate::progress::stats::StageStats;
 use crate::records::FinishedBorder;
 use crate::run::folder::Folder;
 use crate::run::job::Job;
-use crate::run::phases::meshed_part::SomeTiles;
+use crate::run::meshed_part::SomeTiles;
 use crate::run::phases::stage_costs::triangulated_share;
+use crate::tiles::appearance::TileAppearance;
 use crate::tiles::border_normals::finish_border_normals;
 use crate::tiles::dependencies::{FinishedTile, TileDependencies};
-use crate::tiles::max_edge::MaxEdgeRule;
 use crate::tiles::seam::seam_of;
-use crate::tiles::style::TileStyle;
 use crate::tiles::write_tile::{TileStats, write_tile};
-use delaunay::geometry::Bounds;
 use rayon::Scope;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use sys::{Result, fault, interrupt};
-use tiles::color::HeightRange;
-use tiles::preview::canvas::{Canvas, longer_side};
 
 /// Finishes and writes tiles. Any thread may call its methods.
 pub(crate) struct TileQueue<'a> {
-    folder: &'a Folder<'a>,
+    folder: &'a Folder,
     partition: &'a Partition,
     stage: &'a Stage,
     /// Whether all that the tiles need stays once they are written.
@@ -53,29 +48,10 @@ struct QueueState {
     failure: Option<crate::Error>,
 }
 
-/// How tiles look, and what they are drawn on.
-pub(crate) struct TileAppearance {
-    pub(crate) style: TileStyle,
-    pub(crate) canvas: Canvas,
-}
-
-impl TileAppearance {
-    /// Returns the appearance of a job whose points are within `bounds`, and whose greatest colour is `max_rgb`.
-    ///
-    /// # Errors
-    /// Those of [`TileStyle::new`].
-    pub(crate) fn new(plan: &Plan, max_rgb: u16, bounds: Bounds<3>, max_edge: MaxEdgeRule) -> Result<TileAppearance> {
-        let heights = plan.heights.unwrap_or(HeightRange::of(bounds));
-        let style = TileStyle::new(plan, max_rgb, bounds, heights, max_edge)?;
-        let canvas = Canvas::new(&style.frame, bounds, heights, longer_side());
-        Ok(TileAppearance { style, canvas })
-    }
-}
-
 impl<'a> TileQueue<'a> {
     pub(crate) fn new(
         job: &Job,
-        folder: &'a Folder<'a>,
+        folder: &'a Folder,
         partition: &'a Partition,
         stage: &'a Stage,
         appearance: Option<Arc<TileAppearance>>,

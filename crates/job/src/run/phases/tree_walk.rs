@@ -22,7 +22,7 @@ use sys::{Error, Result, fault, interrupt};
 /// Walks the tree.
 pub(crate) struct TreeWalk<'a> {
     pub(crate) job: &'a Job<'a>,
-    pub(crate) folder: &'a Folder<'a>,
+    pub(crate) folder: &'a Folder,
     pub(crate) partition: &'a Partition,
     pub(crate) points: PointFiles,
     pub(crate) stage: &'a Stage,
@@ -53,7 +53,7 @@ impl<'a> TreeWalk<'a> {
 
     fn leaf(&self, scope: &Scope<'a>, node: NodeIndex, tile: TileIndex) -> crate::Result<LeafStats> {
         interrupt::check()?;
-        let Job { plan, triangulator, .. } = *self.job;
+        let (plan, triangulator) = (self.job.plan, self.job.triangulator);
         let (points, store) = (self.partition.points(tile), &self.folder.store);
         let triangulate = || triangulate_leaf(plan, self.partition, &self.points, store, triangulator, tile);
         let stats = self.activity.time(points, triangulate)?;
@@ -68,7 +68,7 @@ impl<'a> TreeWalk<'a> {
 
     fn merge(&self, scope: &Scope<'a>, node: NodeIndex) -> crate::Result<()> {
         interrupt::check()?;
-        let Job { plan, threads, .. } = *self.job;
+        let (plan, threads) = (self.job.plan, self.job.threads);
         let store = &self.folder.store;
         let below = self.partition.tree.merged_by(node);
         if below.iter().any(|&child| self.unmerged.sites(child).is_some()) {

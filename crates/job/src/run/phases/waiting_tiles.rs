@@ -5,11 +5,10 @@
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::records::StepRecord;
 use crate::run::job::Job;
+use crate::run::meshed_part::{MeshedPart, SomeTiles};
 use crate::run::phases::join::{JoinedParts, merge_through};
-use crate::run::phases::meshed_part::{MeshedPart, SomeTiles};
-use crate::run::phases::part_store::PartStores;
 use crate::run::phases::tile_phase::{BorderSession, ForeignBorders};
-use crate::run::phases::tile_queue::TileAppearance;
+use crate::tiles::appearance::TileAppearance;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 use sys::Result;
@@ -29,7 +28,6 @@ struct WaitingPart {
 /// The tiles that wait for parts to come.
 pub(crate) struct WaitingTiles<'a> {
     job: &'a Job<'a>,
-    stores: &'a PartStores,
     appearance: Arc<TileAppearance>,
     /// The tiles that merges may still change.
     open: HashSet<TileIndex>,
@@ -40,9 +38,9 @@ pub(crate) struct WaitingTiles<'a> {
 
 impl<'a> WaitingTiles<'a> {
     /// Returns the front before any part is done.
-    pub(crate) fn new(job: &'a Job<'a>, stores: &'a PartStores, appearance: Arc<TileAppearance>) -> WaitingTiles<'a> {
+    pub(crate) fn new(job: &'a Job<'a>, appearance: Arc<TileAppearance>) -> WaitingTiles<'a> {
         let (open, waiting, stored) = (HashSet::new(), BTreeMap::new(), HashMap::new());
-        WaitingTiles { job, stores, appearance, open, waiting, stored }
+        WaitingTiles { job, appearance, open, waiting, stored }
     }
 
     /// Returns the bytes that all parts so far keep on the disk.
@@ -55,7 +53,7 @@ impl<'a> WaitingTiles<'a> {
     /// # Errors
     /// Those of the steps.
     pub(crate) fn pass(&mut self, part: PartIndex, meshed: &MeshedPart) -> crate::Result<()> {
-        let opened = self.stores.open(part)?;
+        let opened = self.job.open(part)?;
         self.stored.insert(part, opened.store.bytes());
         self.open.extend(&meshed.open);
         let SomeTiles { written, with_border, .. } = &opened.tiles;
@@ -65,14 +63,14 @@ impl<'a> WaitingTiles<'a> {
         self.waiting
             .insert(part, WaitingPart { tiles, outer: meshed.open.iter().copied().collect(), is_kept: meshed.is_kept });
         drop(opened);
-        for tile in merge_through(self.job, self.stores, part)? {
+        for tile in merge_through(self.job, part)? {
             self.open.remove(&tile);
         }
         self.write_ready_tiles()
     }
 
     fn write_ready_tiles(&mut self) -> crate::Result<()> {
-        let WaitingTiles { job, stores, appearance, open, waiting, stored } = self;
+        let WaitingTiles { job, appearance, open, waiting, stored } = self;
         let is_due = |(tile, before): (&TileIndex, &Option<Vec<TileIndex>>)| {
             let all = before.iter().flatten().chain([tile]);
             all.into_iter().all(|tile| !open.contains(tile))
@@ -80,10 +78,9 @@ impl<'a> WaitingTiles<'a> {
         let mut due = waiting.iter_mut().filter(|(_, part)| part.tiles.iter().any(is_due)).peekable();
         if due.peek().is_some() {
             let joined = JoinedParts::so_far(job, appearance.clone())?;
-            let borders = &ForeignBorders::new(job, stores, &joined);
+            let borders = &ForeignBorders::new(job, &joined);
             for (&part, WaitingPart { tiles, outer, is_kept }) in due {
-                let directory = &job.directory.part(part);
-                let session = BorderSession::open(borders, directory, part, tiles.len())?;
+                let session = BorderSession::open(borders, part, tiles.len())?;
                 let before = session.store().bytes();
                 let some = write_ready(&session, tiles, open)?;
                 if !*is_kept {

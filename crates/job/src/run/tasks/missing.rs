@@ -7,13 +7,11 @@ use crate::phase::{Phase, PhaseTasks};
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::Fingerprint;
 use crate::records::JobStep;
-use crate::run::finished::{InPlace, is_rest};
-use crate::run::part_entries::{PartHeader, entries_of};
+use crate::run::finished::{InPlace, is_rest, results_in_place};
 use crate::run::phases::part_progress::PartProgress;
+use crate::run::planned_job::{PlannedJob, planned};
 use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
-use crate::run::tasks::finished_job::in_place;
-use crate::run::tasks::planned_job::{PlannedJob, planned};
 use std::collections::BTreeSet;
 use sys::Result;
 use sys::threads::on_threads;
@@ -39,15 +37,12 @@ impl<'a> JobProgressByPart<'a> {
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a journal.
     pub(crate) fn of_parts(job: &'a PlannedJob, wanted: impl Fn(PartIndex) -> bool) -> Result<JobProgressByPart<'a>> {
-        let header = |part| PartHeader { job: job.header.id, part };
         let part = |part| match wanted(part) {
-            true => PartProgress::of(&job.directory.part(part), header(part)),
+            true => PartProgress::of(&job.entries(part)?),
             false => Ok(PartProgress::default()),
         };
         let parts = job.parts.all().map(part).collect::<Result<_>>()?;
-        let above = header(PartIndex::new(job.parts.all().len()));
-        let joined = entries_of(&job.directory.join(), above)?;
-        let is_joined = joined.iter().any(|entry| entry.step == JobStep::Join);
+        let is_joined = job.entries(job.parts.tree.part)?.has(JobStep::Join);
         Ok(JobProgressByPart { job, parts, is_joined })
     }
 
@@ -121,7 +116,7 @@ pub(crate) fn not_planned() -> crate::Error {
 /// [`sys::Error::Config`] if there are no inputs, [`sys::Error::Io`] if one of them, or a journal, cannot be read.
 pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     let directory = JobDirectory::new(&options.output.directory);
-    if let InPlace::ThisJob(_) = in_place(&directory, options, 0)? {
+    if let InPlace::ThisJob(_) = results_in_place(&directory, options, 0)? {
         let has_rest = is_rest(&directory)?;
         return Ok(of_each(
             options,

@@ -5,11 +5,9 @@
 //! bytes, however many tasks there are.
 
 mod dealing;
-mod finished_job;
 pub(crate) mod missing;
 mod part_tasks;
 mod plan_task;
-mod planned_job;
 pub(crate) mod status;
 
 use crate::Result;
@@ -20,13 +18,12 @@ use crate::progress::clock::JobClock;
 use crate::report::job_report::Report;
 use crate::report::task_outcome::{DoneTask, TaskOutcome};
 use crate::run::attempt::run_until_it_fits;
-use crate::run::finished::{InPlace, remove_rest};
+use crate::run::finished::{InPlace, remove_rest, results_in_place};
+use crate::run::planned_job::PlannedJob;
 use crate::run::single_process;
-use crate::run::tasks::finished_job::in_place;
 use crate::run::tasks::missing::{JobProgressByPart, not_planned};
 use crate::run::tasks::part_tasks::work_on_parts;
 use crate::run::tasks::plan_task::plan;
-use crate::run::tasks::planned_job::PlannedJob;
 
 /// Does one task of one phase of a job.
 ///
@@ -38,8 +35,7 @@ pub(crate) fn work(options: &JobOptions, run: RunOptions, phase: Phase, task: Ta
     // A phase with one task is done by the first.
     if phase.is_by_part() || task.number == 1 {
         let directory = &JobDirectory::new(&options.output.directory);
-        let in_place = in_place(directory, options, run.submission)?;
-        match (phase, in_place) {
+        match (phase, results_in_place(directory, options, run.submission)?) {
             (Phase::Publish, InPlace::ThisJob(report)) => {
                 remove_rest(directory, options.threads())?;
                 return Ok(TaskOutcome::Published(report));

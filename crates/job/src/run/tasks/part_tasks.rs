@@ -1,6 +1,7 @@
 //! The phases between the plan and publishing.
 
 use crate::durable::directory::JobDirectory;
+use crate::durable::listing::entries;
 use crate::durable::lock::Lock;
 use crate::index::PartIndex;
 use crate::options::{JobOptions, RunOptions};
@@ -8,27 +9,25 @@ use crate::phase::{Phase, Task};
 use crate::plan::budget::workers;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
+use crate::publish::written_tiles::wants_tileset;
 use crate::run::attempt::{NO_LOCKS, may_coarsen};
 use crate::run::damage::{damaged_by_tasks, is_cut_off};
-use crate::run::job::Job;
+use crate::run::job::{Job, Process};
 use crate::run::phases::appearance::{SitesOfParts, early_appearance};
 use crate::run::phases::join::{JoinedParts, join_parts};
 use crate::run::phases::level_phase::levels_of_part;
 use crate::run::phases::mesh_phase::mesh_one;
 use crate::run::phases::part_progress::PartProgress;
-use crate::run::phases::part_store::PartStores;
-use crate::run::phases::publish_phase::wants_tileset;
 use crate::run::phases::read_phase::{read_for, sum_up};
 use crate::run::phases::select_phase::{know_selection, select_vertices, selects};
 use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
+use crate::run::planned_job::PlannedJob;
 use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
 use crate::run::tasks::missing::{JobProgressByPart, not_planned, too_early};
-use crate::run::tasks::planned_job::PlannedJob;
 use crate::tiles::write_tile::TileStats;
 use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
-use sys::disk;
 use sys::threads::on_threads;
 use tiles::options::OutputFormat;
 
@@ -86,7 +85,7 @@ fn parts_of(job: &PlannedJob, phase: Phase, task: Task) -> Vec<PartIndex> {
 /// Shares the lock of the job directory; `None` if there is none.
 fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
     let journal = directory.journal();
-    let is_there = disk::list(directory.job()).map_err(sys::Error::io("read", directory.job()))?.contains(&journal);
+    let is_there = entries(directory.job())?.contains(&journal);
     let is_left = || single_process::is_noted(directory, submission);
     if is_there || is_left()? { directory.share_lock().map(Some) } else { Ok(None) }
 }
@@ -112,9 +111,7 @@ impl PartTask<'_> {
             _ => Triangulator::without_gpu(&options.triangulation),
         };
         triangulator.prepare(mine.iter().map(|&part| self.job.parts.expected_points(part)).sum(), threads);
-        let job = &Job {
-            plan: &self.job.plan,
-            parts: &self.job.parts,
+        let process = Process {
             directory: &self.job.directory,
             triangulator: &triangulator,
             progress: &JobProgress::new(self.run.progress, clock, Vec::new()),
@@ -124,6 +121,7 @@ impl PartTask<'_> {
             checks_points: true,
             is_task: true,
         };
+        let job = &Job::new(process, &self.job.plan, &self.job.parts);
         match self.phase {
             Phase::Read => self.each(mine, |part| read_for(job, part, 0).map(|_| ())),
             Phase::Select => self.select(job),
@@ -179,13 +177,12 @@ impl PartTask<'_> {
         let (_, bounds) = sum_up(job, progress.parts.iter().filter_map(|part| part.read.as_ref()))?;
         know_selection(job)?;
         let mesh = progress.parts.iter().filter_map(|part| part.mesh.as_ref());
-        join_parts(job, &PartStores::new(job), SitesOfParts { sites: mesh.map(|mesh| mesh.leaves.sites).sum(), bounds })
+        join_parts(job, SitesOfParts { sites: mesh.map(|mesh| mesh.leaves.sites).sum(), bounds })
     }
 
     fn tiles(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
         let joined = self.joined(job)?;
-        let stores = &PartStores::new(job);
-        let borders = &ForeignBorders::new(job, stores, &joined);
+        let borders = &ForeignBorders::new(job, &joined);
         self.each(mine, |part| finish_part(borders, part).map(|_| ()))
     }
 
@@ -197,8 +194,7 @@ impl PartTask<'_> {
         let joined = self.joined(job)?;
         progress.require(Phase::Tiles, self.task.count, needs)?;
         let has_tileset = wants_tileset(job.plan, &tiles_of(&progress.parts));
-        let stores = &PartStores::new(job);
-        self.each(mine, |part| levels_of_part(job, stores, &joined, part, has_tileset).map(|_| ()))
+        self.each(mine, |part| levels_of_part(job, &joined, part, has_tileset).map(|_| ()))
     }
 
     fn joined(&self, job: &Job) -> Result<JoinedParts> {

@@ -1,33 +1,25 @@
 //! The phase plan.
 
 use crate::durable::directory::JobDirectory;
+use crate::durable::listing::exists;
 use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::options::{JobOptions, RunOptions};
 use crate::partition::parts::Parts;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::plan::job_plan::Plan;
-use crate::plan::make_plan::make_plan;
 use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::contour_estimate::ContourSample;
-use crate::preflight::input_places::check_inputs_are_no_results;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
-use crate::publish::contours::check::check_contours;
-use crate::publish::height_offset_check::check_height_offset;
-use crate::publish::map_tiles::check::check_map_tiles;
-use crate::publish::raster::check::check_raster;
-use crate::publish::terrain_tiles::check::check_terrain;
 use crate::run::attempt::read_earlier;
-use crate::run::earlier_run::{EarlierRun, start};
+use crate::run::earlier_run::{EarlierRun, PlanOrigin, start};
 use crate::run::finished::known_submission;
-use crate::run::phases::plan_phase::{note_skipped, write_plan};
+use crate::run::phases::plan_phase::{find_plan, note_skipped, write_plan};
+use crate::run::planned_job::planned;
 use crate::run::single_process;
-use crate::run::tasks::planned_job::planned;
-use crate::tiles::vertex_colors::check_photo;
 use std::time::SystemTime;
 use sys::threads::on_threads;
-use sys::{Error, disk};
 
 /// Plans the job, unless that is done. Returns what there is to say.
 ///
@@ -53,19 +45,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     let coarsening = earlier.as_ref().and_then(|earlier| earlier.coarsening(&fingerprint)).unwrap_or_default();
     let submission = run.submission.max(known_submission(directory)?);
     let header = JobHeader { fingerprint, coarsening, id: 0, submission, begun: Some(begun) };
-    let known = earlier.as_ref().and_then(|earlier| earlier.plan(directory, &header, options));
-    let has_plan = known.is_some();
-    let plan = match known {
-        Some(plan) => plan,
-        None => on_threads(workers(options, 0)?, || make_plan(options, coarsening))?,
-    };
-    check_inputs_are_no_results(&plan)?;
-    check_height_offset(&plan)?;
-    check_photo(&plan)?;
-    check_raster(&plan)?;
-    check_map_tiles(&plan)?;
-    check_contours(&plan)?;
-    check_terrain(&plan)?;
+    let (plan, origin) = find_plan(directory, options, &header, earlier.as_ref(), run.progress)?;
     note_skipped(&plan.skipped, &JobProgress::new(run.progress, JobClock::start(), Vec::new()));
     let threads = workers(options, plan.records)?;
     if !run.force {
@@ -81,8 +61,8 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     }
     single_process::remove_notes(directory)?;
     on_threads(threads, || {
-        let start = start(directory, &header, earlier, has_plan, false, false, run.progress)?;
-        if !has_plan {
+        let start = start(directory, &header, earlier, origin, false, run.progress)?;
+        if origin != PlanOrigin::Kept {
             write_plan(&start.journal, directory, plan)?;
         }
         Ok(None)
@@ -98,8 +78,7 @@ fn modified_inputs(earlier: &EarlierRun, now: &Fingerprint) -> Option<String> {
 
 /// Tells whether the job with this fingerprint is planned. Nobody starts it over meanwhile.
 fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u64) -> crate::Result<bool> {
-    let journal = directory.journal();
-    if !disk::exists(&journal).map_err(Error::io("read", &journal))? {
+    if !exists(&directory.journal())? {
         return Ok(false);
     }
     let _lock = directory.share_lock()?;

@@ -6,11 +6,10 @@ use crate::options::JobOptions;
 use crate::phase::Phase;
 use crate::report::job_report::SlowestPart;
 use crate::report::job_status::{JobState, JobStatus, PhaseStatus};
-use crate::run::finished::InPlace;
+use crate::run::finished::{InPlace, results_in_place};
+use crate::run::planned_job::PlannedJob;
 use crate::run::single_process;
-use crate::run::tasks::finished_job::in_place;
 use crate::run::tasks::missing::JobProgressByPart;
-use crate::run::tasks::planned_job::PlannedJob;
 use sys::Result;
 
 /// Returns how far the job is.
@@ -25,7 +24,7 @@ pub(crate) fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStat
     if single_process::is_noted(&directory, 0)? {
         return Ok(simple(JobState::LeftToPublish));
     }
-    let without_plan = match in_place(&directory, options, 0)? {
+    let without_plan = match results_in_place(&directory, options, 0)? {
         InPlace::ThisJob(_) => return Ok(simple(JobState::Done)),
         InPlace::OtherJob => JobState::OtherResults,
         InPlace::Nothing => JobState::NotPlanned,

@@ -2,16 +2,16 @@
 
 use crate::durable::atomic_file::{publish, remove_file, write_pending};
 use crate::durable::directory::JobDirectory;
+use crate::durable::listing::{exists, read_if_there};
 use crate::publish::side_files::EachTile;
 use crate::records::{StepRecord, Store, TileSummary};
 use crate::report::change_counts::ChangeCounts;
 use lattice::Lattice;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
-use std::io::ErrorKind;
 use std::path::Path;
 use sys::{Error, Result, disk};
-use tiles::checksums::{Checksum, parse_list, read_file};
+use tiles::checksums::{Checksum, parse_list};
 
 /// What has changed. Paths are from the output directory, with slashes.
 #[derive(Debug, Default, PartialEq, Serialize)]
@@ -37,7 +37,8 @@ pub(crate) fn write_changes(
     tiles: &dyn EachTile,
     new: &[(String, Checksum)],
 ) -> Result<Option<ChangeCounts>> {
-    let Some(old) = list_in(&directory.results().checksums())? else { return Ok(None) };
+    let old = read_if_there(&directory.results().checksums())?.and_then(|text| parse_list(&text));
+    let Some(old) = old.map(|files| files.into_iter().collect::<BTreeMap<_, _>>()) else { return Ok(None) };
     let mut changes = Changes::between(&old, new);
     let other: HashSet<&Path> = changes.changed.iter().chain(&changes.added).map(Path::new).collect();
     let mut areas = Vec::new();
@@ -64,7 +65,7 @@ pub(crate) fn write_changes(
 /// [`Error::Io`] if the list cannot be written.
 pub(crate) fn end_without_changes(directory: &JobDirectory) -> Result<bool> {
     let waits = directory.changes();
-    let was_interrupted = disk::exists(&waits).map_err(Error::io("read", &waits))?;
+    let was_interrupted = exists(&waits)?;
     if !was_interrupted {
         Changes::default().write(directory)?;
     }
@@ -89,16 +90,9 @@ pub(crate) fn mark_placed(directory: &JobDirectory) -> Result<()> {
 /// [`Error::Io`] if it cannot be put there.
 pub(crate) fn place_changes(directory: &JobDirectory) -> Result<()> {
     let (waits, place) = (directory.changes(), directory.results().changes());
-    match disk::exists(&waits).map_err(Error::io("read", &waits))? {
+    match exists(&waits)? {
         true => disk::link(&waits, &place, &directory.on_the_way()).map_err(Error::io("write", &place)),
         false => Ok(()),
-    }
-}
-
-fn list_in(path: &Path) -> Result<Option<BTreeMap<String, Checksum>>> {
-    match read_file(path) {
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
-        text => Ok(parse_list(&text.map_err(Error::io("read", path))?).map(|files| files.into_iter().collect())),
     }
 }
 

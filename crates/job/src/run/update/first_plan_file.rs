@@ -2,10 +2,10 @@
 
 use crate::durable::atomic_file::{publish, write_pending};
 use crate::durable::directory::JobDirectory;
+use crate::durable::listing::exists;
 use crate::plan::job_plan::Plan;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
-use sys::disk::exists;
 use sys::{Error, Result};
 use tiles::checksums::Checksum;
 
@@ -30,8 +30,7 @@ pub(crate) fn first_plan(directory: &JobDirectory) -> Option<Plan> {
 /// # Errors
 /// [`Error::Io`] if the disk does not tell.
 pub(crate) fn has_first_plan(directory: &JobDirectory) -> Result<bool> {
-    let path = directory.first_plan();
-    exists(&path).map_err(Error::io("read", &path))
+    exists(&directory.first_plan())
 }
 
 /// Keeps the plan of a job with `--update`, unless that of an earlier run is there.

@@ -5,10 +5,11 @@ use crate::durable::atomic_file::{create_folder_of, publish, write_pending};
 use crate::durable::directory::JobDirectory;
 use crate::durable::file_list::listed;
 use crate::durable::journal::PublishedFile;
+use crate::durable::listing::exists;
 use crate::plan::fingerprint::first_few;
 use crate::progress::stage::ProgressOutput;
 use std::path::{Path, PathBuf};
-use sys::disk::{exists, is_one_file, link};
+use sys::disk::{is_one_file, link};
 use sys::{Error, Result, interrupt};
 use tiles::checksums::{list_text, parse_list, read_file};
 
@@ -30,8 +31,7 @@ impl Mended {
     /// [`Error::Io`] if a copy cannot be made.
     pub(crate) fn of(directory: &JobDirectory, mut files: Vec<PublishedFile>) -> Result<Mended> {
         files.sort_by(|a, b| a.name.cmp(&b.name));
-        let mark = directory.placed_mark();
-        let is_interrupted = !exists(&mark).map_err(Error::io("read", &mark))?;
+        let is_interrupted = !exists(&directory.placed_mark())?;
         let mut mended = Mended { is_interrupted, ..Mended::default() };
         mended.write_list(directory, &files)?;
         for file in &files {
@@ -64,9 +64,9 @@ impl Mended {
 
     fn mend(&mut self, directory: &JobDirectory, file: &PublishedFile) -> Result<()> {
         let (waits, place) = (directory.file(&file.name), directory.results().directory().join(&file.name));
-        let is_one = || Ok(exists(&place)? && is_one_file(&waits, &place)?);
         if file.is_whole(directory) {
-            let is_placed = is_one().map_err(Error::io("read", &place))? || file.is_in_place(directory);
+            let is_one = exists(&place)? && is_one_file(&waits, &place).map_err(Error::io("read", &place))?;
+            let is_placed = is_one || file.is_in_place(directory);
             self.put_back.extend((!is_placed && !self.is_interrupted).then(|| file.name.clone()));
         } else if file.is_in_place(directory) {
             create_folder_of(&waits)?;

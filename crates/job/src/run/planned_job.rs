@@ -2,6 +2,8 @@
 
 use crate::durable::directory::JobDirectory;
 use crate::durable::journal;
+use crate::durable::listing::entries;
+use crate::index::PartIndex;
 use crate::options::JobOptions;
 use crate::partition::parts::Parts;
 use crate::plan::fingerprint::{JobHeader, PLAN_AGAIN};
@@ -9,7 +11,8 @@ use crate::plan::input_identity::InputChange;
 use crate::plan::inputs::input_paths;
 use crate::plan::job_plan::Plan;
 use crate::records::{JobStep, StepRecord};
-use sys::{Error, Result, disk};
+use crate::run::part_entries::{PartEntries, PartHeader};
+use sys::{Error, Result};
 
 /// A job of several parts that is planned.
 pub(crate) struct PlannedJob {
@@ -36,6 +39,14 @@ impl PlannedJob {
         // One process does a small job.
         let has_tasks = parts.all().len() > 1;
         Ok(has_tasks.then(|| PlannedJob { directory: directory.clone(), header, parts, plan, is_complete }))
+    }
+
+    /// Returns the phases of `part`, or of the nodes above the parts, that are complete.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if its journal cannot be read.
+    pub(crate) fn entries(&self, part: PartIndex) -> Result<PartEntries> {
+        PartEntries::of(&self.directory, &self.parts, PartHeader { job: self.header.id, part })
     }
 
     /// Checks that the inputs of these numbers are those that were planned, and calls them what they are called by now.
@@ -69,7 +80,7 @@ impl PlannedJob {
 pub(crate) fn planned(directory: &JobDirectory, submission: u64) -> Result<Option<(JobHeader, bool)>> {
     // Other machines may have made the folders.
     directory.probe()?;
-    disk::list(&directory.parts()).map_err(Error::io("read", directory.parts()))?;
+    entries(&directory.parts())?;
     let read = journal::read::<JobHeader, JobStep, StepRecord>(directory)?;
     let Some((Some(header), entries)) = read else { return Ok(None) };
     let is_planned = |step: JobStep| entries.iter().any(|entry| entry.step == step);

@@ -2,8 +2,8 @@
 
 use crate::index::TileIndex;
 use crate::mesh::leaf::LeafStats;
-use crate::records::{JobStep, JournalEntry};
-use crate::run::done::Done;
+use crate::records::JobStep;
+use crate::run::part_entries::PartEntries;
 use crate::tiles::write_tile::TileStats;
 use serde::{Deserialize, Serialize};
 use sys::Result;
@@ -52,6 +52,16 @@ pub(crate) struct WaitedTile {
 }
 
 impl SomeTiles {
+    /// Returns what is written of the tiles of a part with these `entries`.
+    ///
+    /// # Errors
+    /// [`sys::Error::Broken`] if they are not understood.
+    pub(crate) fn of(entries: &PartEntries) -> Result<SomeTiles> {
+        let mut all = SomeTiles::default();
+        entries.all_figures(JobStep::Tiles)?.into_iter().for_each(|some| all.add(some));
+        Ok(all)
+    }
+
     /// Adds tiles that were written later.
     pub(crate) fn add(&mut self, later: SomeTiles) {
         self.stats += later.stats;
@@ -59,16 +69,4 @@ impl SomeTiles {
         self.with_border.extend(later.with_border);
         self.waited.extend(later.waited);
     }
-}
-
-/// Returns what is written of the tiles of a part, as its `entries` tell.
-///
-/// # Errors
-/// [`sys::Error::Broken`] if they are not understood.
-pub(crate) fn tiles_so_far(entries: &[JournalEntry]) -> Result<SomeTiles> {
-    let mut all = SomeTiles::default();
-    for entry in entries.iter().filter(|entry| entry.step == JobStep::Tiles) {
-        all.add(entry.figures::<Done<SomeTiles>>()?.figures);
-    }
-    Ok(all)
 }
