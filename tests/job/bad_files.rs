@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use job::durable::directory::JobDirectory;
+use job::durable::lock::Lock;
 use job::index::PartIndex;
 use job::partition::part_points::read_inputs;
 use job::partition::parts::Parts;
@@ -142,7 +143,7 @@ fn planned(folder: &Path) -> (JobDirectory, Plan) {
 fn error_after(change: impl Fn(&Path)) -> job::Error {
     let folder = tempfile::tempdir().unwrap();
     let (directory, plan) = planned(folder.path());
-    let _lock = directory.create().unwrap();
+    let _lock = Lock::take(directory.job()).unwrap();
     change(&plan.inputs[0].source.path);
     assert_eq!(plan.options.input.on_bad_file, OnBadFile::Skip);
     let (parts, stage) = (Parts::of(&plan), ProgressOutput::Quiet.stage("read", 0, "points"));

@@ -7,6 +7,7 @@ use delaunay_gpu::triangulation_options::{Backend, TriangulationOptions};
 use delaunay_gpu::triangulator::Triangulator;
 use job::durable::atomic_file::{create_folder, publish};
 use job::durable::directory::JobDirectory;
+use job::durable::lock::Lock;
 use job::index::{NodeIndex, PartIndex};
 use job::merge_records::Seam;
 use job::mesh::leaf::triangulate_leaf;
@@ -47,7 +48,7 @@ fn written_and_read(plan: &Plan, directory: &JobDirectory) -> Plan {
 /// Plans, reads, triangulates every leaf and merges every merge node.
 fn run_steps(job: &Job, options: &JobOptions) -> (Store, Partition) {
     let directory = JobDirectory::new(&job.out());
-    directory.create().unwrap();
+    Lock::take(directory.job()).unwrap();
     let plan = make_plan(options, LatticeCoarsening::default()).unwrap();
     let mut plan = written_and_read(&plan, &directory);
     // The buffers get a sixth of this.

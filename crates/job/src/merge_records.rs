@@ -93,8 +93,8 @@ impl Frontier {
     /// [`sys::Error::Io`], or [`sys::Error::Broken`] if there is none.
     pub fn load(store: &Store, node: NodeIndex) -> Result<Frontier> {
         let mut columns = ColumnReader::open(store, StepRecord::Frontier(node))?;
-        let (sites, questions) = (columns.column_vec()?, columns.column_vec()?);
-        let (boundary, passes) = (columns.column_vec()?, columns.column_vec()?);
+        let (sites, questions) = (columns.column()?, columns.column()?);
+        let (boundary, passes) = (columns.column()?, columns.column()?);
         let triangles = columns.column::<u64>()?.iter().sum();
         Ok(Frontier { sites, boundary, passes, questions, triangles })
     }
@@ -106,8 +106,8 @@ impl Frontier {
     /// As [`Frontier::load`].
     pub fn count(store: &Store, node: NodeIndex) -> Result<u64> {
         let mut columns = ColumnReader::open(store, StepRecord::Frontier(node))?;
-        let sites = columns.column::<BorderVertex>()?.len() as u64;
-        Ok(sites + columns.column::<FlowQuestion>()?.len() as u64 / QUESTIONS_PER_SITE)
+        let sites = columns.skip_column::<BorderVertex>()? as u64;
+        Ok(sites + columns.skip_column::<FlowQuestion>()? as u64 / QUESTIONS_PER_SITE)
     }
 
     /// Returns the tiles that own sites of it or ask something, ascending.
@@ -211,14 +211,14 @@ impl Seam {
     /// [`sys::Error::Io`], or [`sys::Error::Broken`] if there is no record.
     pub fn touching(store: &Store, node: NodeIndex, tile: TileIndex) -> Result<SeamOfTile> {
         let mut columns = ColumnReader::open(store, StepRecord::Seam(node))?;
-        columns.column::<HullCount>()?;
+        columns.skip_column::<HullCount>()?;
         let index = columns.column::<[u32; 3]>()?;
         let all = columns.column::<TrimmedEdge>()?;
         let from = all.partition_point(|trimmed| trimmed.tile < tile);
         let trimmed = all[from..].iter().take_while(|trimmed| trimmed.tile == tile).map(|trimmed| trimmed.edge);
         let trimmed = trimmed.collect();
         let triangles = match index.binary_search_by_key(&tile.0, |entry| entry[0]) {
-            Ok(at) => columns.column_part(index[at][1] as usize, index[at][2] as usize)?.to_vec(),
+            Ok(at) => columns.column_part(index[at][1] as usize, index[at][2] as usize)?,
             Err(_) => Vec::new(),
         };
         Ok(SeamOfTile { triangles, trimmed })

@@ -314,7 +314,7 @@ impl PartialNormals {
     /// [`Error::Io`], or [`Error::Broken`] if there is none.
     pub fn load(store: &Store, tile: TileIndex) -> Result<PartialNormals> {
         let mut columns = ColumnReader::open(store, StepRecord::PartialNormals(tile))?;
-        let (sums, rgb, class) = (columns.column_vec()?, columns.column_vec()?, columns.column_vec()?);
+        let (sums, rgb, class) = (columns.column()?, columns.column()?, columns.column()?);
         Ok(PartialNormals { sums, rgb, class, intensity: last_column(&mut columns)? })
     }
 }
@@ -326,7 +326,7 @@ fn push_unless_empty<'a, T: Pod>(columns: ColumnWriter<'a>, last: &'a [T]) -> Co
 
 /// Reads the column that [`push_unless_empty`] has written.
 fn last_column<T: Pod>(columns: &mut ColumnReader<StepRecord>) -> Result<Vec<T>> {
-    if columns.is_at_end() { Ok(Vec::new()) } else { columns.column_vec() }
+    if columns.is_at_end() { Ok(Vec::new()) } else { columns.column() }
 }
 
 /// A finished vertex on the border of a tile, with what the neighbouring tiles write of it.
@@ -368,7 +368,7 @@ impl FinishedBorder {
     /// [`Error::Io`], or [`Error::Broken`] if there is none.
     pub fn load(store: &Store, tile: TileIndex) -> Result<FinishedBorder> {
         let mut columns = ColumnReader::open(store, StepRecord::FinishedBorder(tile))?;
-        Ok(FinishedBorder { vertices: columns.column_vec()?, intensity: last_column(&mut columns)? })
+        Ok(FinishedBorder { vertices: columns.column()?, intensity: last_column(&mut columns)? })
     }
 
     /// Returns the vertex of `site` and its intensity.
@@ -480,7 +480,7 @@ impl LevelSummary {
         let mut columns = ColumnReader::open(store, StepRecord::Level(node))?;
         let own = columns.column()?;
         let [own] = own[..] else { return Err(Error::Broken(format!("the record of coarser tile {node} is damaged"))) };
-        Ok(LevelSummary { own, leaves: columns.column_vec()? })
+        Ok(LevelSummary { own, leaves: columns.column()? })
     }
 }
 

@@ -6,6 +6,7 @@
 
 use crate::fault::traced;
 use crate::{fault, positional_io};
+use std::borrow::Borrow;
 use std::fs::{self, File, Metadata};
 use std::io::{ErrorKind, Result, Write};
 use std::ops::Range;
@@ -237,16 +238,16 @@ pub fn list(path: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Writes to a file from a position on, one piece after the other.
-pub struct WriteFrom<'a> {
+pub struct WriteFrom<F> {
     /// The file.
-    pub file: &'a File,
+    pub file: F,
     /// Where the next piece goes, in bytes.
     pub at: u64,
 }
 
-impl Write for WriteFrom<'_> {
+impl<F: Borrow<File>> Write for WriteFrom<F> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize> {
-        write_all_at(self.file, bytes, self.at)?;
+        write_all_at(self.file.borrow(), bytes, self.at)?;
         self.at += bytes.len() as u64;
         Ok(bytes.len())
     }

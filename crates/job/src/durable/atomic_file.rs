@@ -31,72 +31,27 @@ pub fn write_pending(path: &Path, content: &[u8]) -> Result<PendingFile> {
     write_pending_pieces(path, &[content])
 }
 
-/// The system begins at once to bring files of so many bytes or more to the disk. So little is left to wait for at the end of a job.
-const WORTH_BEGINNING: u64 = 256 << 10;
-
 /// Writes the concatenated `pieces` under the [`partial_path`] of `path`.
 ///
 /// # Errors
 /// [`Error::Io`] if writing fails.
 pub fn write_pending_pieces(path: &Path, pieces: &[&[u8]]) -> Result<PendingFile> {
-    let partial = partial_path(path);
-    let write = |file: File| {
-        let mut writer = WriteFrom { file: &file, at: 0 };
-        pieces.iter().try_for_each(|piece| writer.write_all(piece))?;
-        if writer.at >= WORTH_BEGINNING {
-            disk::begin_sync(&file);
-        }
-        Ok(())
-    };
-    disk::create(&partial).and_then(write).map_err(Error::io("write", &partial))?;
-    let mut hasher = Xxh3::new();
-    pieces.iter().for_each(|piece| hasher.update(piece));
-    let bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
-    Ok(PendingFile { path: path.into(), bytes, checksum: Checksum::of_hasher(&hasher) })
-}
-
-/// Writes the lines under the [`partial_path`] of `path`, without holding all of them in memory.
-///
-/// # Errors
-/// [`Error::Io`] if writing fails, and the first error of a line.
-pub fn write_pending_lines(path: &Path, lines: impl IntoIterator<Item = Result<String>>) -> Result<()> {
-    const BUFFER: usize = 1 << 20;
-    let partial = partial_path(path);
-    let file = disk::create(&partial).map_err(Error::io("write", &partial))?;
-    let mut writer = BufWriter::with_capacity(BUFFER, WriteFrom { file: &file, at: 0 });
-    for line in lines {
-        writer.write_all(line?.as_bytes()).map_err(Error::io("write", &partial))?;
-    }
-    writer.flush().map_err(Error::io("write", &partial))
+    let mut writer = PendingWriter::create(path)?;
+    pieces.iter().try_for_each(|piece| writer.write(piece))?;
+    writer.finish()
 }
 
 /// Writes a pending file, one piece after the other.
 pub struct PendingWriter {
     path: PathBuf,
     partial: PathBuf,
-    writer: BufWriter<OwnFile>,
+    writer: BufWriter<WriteFrom<File>>,
     hasher: Xxh3,
     bytes: u64,
 }
 
-/// A file that is written from its beginning on.
-struct OwnFile {
-    file: File,
-    at: u64,
-}
-
-impl Write for OwnFile {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        let mut from = WriteFrom { file: &self.file, at: self.at };
-        let written = from.write(bytes)?;
-        self.at = from.at;
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
-}
+/// The system begins at once to bring files of so many bytes or more to the disk. So little is left to wait for at the end of a job.
+const WORTH_BEGINNING: u64 = 256 << 10;
 
 impl PendingWriter {
     /// Creates the pending file of `path`.
@@ -106,8 +61,8 @@ impl PendingWriter {
     pub fn create(path: &Path) -> Result<PendingWriter> {
         const BUFFER: usize = 1 << 20;
         let partial = partial_path(path);
-        let file = disk::create(&partial).map_err(Error::io("create", &partial))?;
-        let writer = BufWriter::with_capacity(BUFFER, OwnFile { file, at: 0 });
+        let file = disk::create(&partial).map_err(Error::io("write", &partial))?;
+        let writer = BufWriter::with_capacity(BUFFER, WriteFrom { file, at: 0 });
         Ok(PendingWriter { path: path.into(), partial, writer, hasher: Xxh3::new(), bytes: 0 })
     }
 
@@ -127,6 +82,9 @@ impl PendingWriter {
     /// [`Error::Io`].
     pub fn finish(mut self) -> Result<PendingFile> {
         self.writer.flush().map_err(Error::io("write", &self.partial))?;
+        if self.bytes >= WORTH_BEGINNING {
+            disk::begin_sync(&self.writer.get_ref().file);
+        }
         Ok(PendingFile { path: self.path, bytes: self.bytes, checksum: Checksum::of_hasher(&self.hasher) })
     }
 }
@@ -214,6 +172,14 @@ pub fn create_folder(path: &Path) -> Result<()> {
 /// [`Error::Io`] if it cannot be made.
 pub fn create_folder_of(path: &Path) -> Result<()> {
     path.parent().map_or(Ok(()), create_folder)
+}
+
+/// Removes the folder at `path`, if it exists, with everything in it.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be removed.
+pub fn remove_tree(path: &Path) -> Result<()> {
+    disk::remove_tree(path).map_err(Error::io("remove", path))
 }
 
 /// Removes the file at `path` if it exists.

@@ -3,7 +3,7 @@
 //! A kill may come at any time. While the journal is there, it says that the job is complete. After that the report in the results does:
 //! what is left has neither a journal nor a note.
 
-use crate::durable::atomic_file::remove_file;
+use crate::durable::atomic_file::{remove_file, remove_tree, sync_folder};
 use crate::durable::directory::JobDirectory;
 use crate::durable::listing::{entries, is_folder};
 use crate::durable::lock::lock_file;
@@ -24,7 +24,7 @@ pub fn remove_job(directory: &JobDirectory) -> Result<()> {
             remove(&path)?;
         }
     }
-    sync(job)?;
+    sync_folder(job)?;
     // In parallel, because the system takes a while to free the cache of large files.
     let parts = [entries(&directory.parts())?, entries(&directory.points_by_part())?].concat();
     let files = parts.iter().map(|part| entries(part)).collect::<Result<Vec<_>>>()?.concat();
@@ -35,7 +35,7 @@ pub fn remove_job(directory: &JobDirectory) -> Result<()> {
     }
     // The lock goes last, because it marks the directory as a job's own: a kill or a power failure before that leaves what the
     // next job may take.
-    sync(job)?;
+    sync_folder(job)?;
     match disk::remove_tree(job) {
         // This process still has the lock. The folder is empty when it ends, and the next job takes an empty one.
         Err(_) if only_open_files_are_left(job) => Ok(()),
@@ -46,7 +46,7 @@ pub fn remove_job(directory: &JobDirectory) -> Result<()> {
 /// Removes the folder at `path`, if it is one, with everything in it.
 fn remove_folder(path: &Path) -> Result<()> {
     if is_folder(path)? {
-        disk::remove_tree(path).map_err(Error::io("remove", path))?;
+        remove_tree(path)?;
         fault::point("cleaning");
     }
     Ok(())
@@ -56,10 +56,6 @@ fn remove(file: &Path) -> Result<()> {
     remove_file(file)?;
     fault::point("cleaning");
     Ok(())
-}
-
-fn sync(folder: &Path) -> Result<()> {
-    disk::sync_folder(folder).map_err(Error::io("write", folder))
 }
 
 /// Tells whether nothing is left in `folder` but files that were removed while a process had them open: NFS keeps them until they are

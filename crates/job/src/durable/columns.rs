@@ -3,9 +3,9 @@
 //! A column is the number of its values as a `u128`, then the values, then zeros up to a multiple of 16 bytes: so values of any type
 //! are aligned in the file, and slices of it can be used as they are.
 
-use crate::durable::mapped::MappedSlice;
-use crate::durable::store::{RecordKey, RecordPlace, Store};
+use crate::durable::store::{RecordKey, Store};
 use bytemuck::Pod;
+use std::ops::Range;
 use sys::{Error, Result};
 
 /// Bytes to which columns are padded: the alignment of `u128`, the largest of plain values.
@@ -52,7 +52,7 @@ pub struct ColumnReader<'a, K> {
     store: &'a Store<K>,
     key: K,
     /// What is left of the record.
-    rest: RecordPlace,
+    rest: Range<u64>,
 }
 
 impl<'a, K: RecordKey> ColumnReader<'a, K> {
@@ -68,65 +68,55 @@ impl<'a, K: RecordKey> ColumnReader<'a, K> {
     ///
     /// # Errors
     /// [`Error::Io`] if reading fails, [`Error::Broken`] if the record is shorter than the column says.
-    pub fn column<T: Pod>(&mut self) -> Result<MappedSlice<'static, T>> {
+    pub fn column<T: Pod>(&mut self) -> Result<Vec<T>> {
         let count = self.count::<T>()?;
-        let column = self.store.read(self.key, self.rest.at, count)?;
-        self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)?;
-        Ok(column)
-    }
-
-    /// Returns the next column as values of the caller's own, read without a map in between.
-    ///
-    /// # Errors
-    /// As [`ColumnReader::column`].
-    pub fn column_vec<T: Pod>(&mut self) -> Result<Vec<T>> {
-        let count = self.count::<T>()?;
-        let column = self.store.read_vec(self.key, self.rest.at, count)?;
+        let column = self.store.read(self.key, self.rest.start, count)?;
         self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)?;
         Ok(column)
     }
 
     /// Returns whether the record has no more columns.
     pub fn is_at_end(&self) -> bool {
-        self.rest.length == 0
+        self.rest.is_empty()
     }
 
-    /// Goes on to the column after the next.
+    /// Goes on to the column after the next, and returns how many values that has.
     ///
     /// # Errors
     /// As [`ColumnReader::column`].
-    pub fn skip_column<T: Pod>(&mut self) -> Result<()> {
+    pub fn skip_column<T: Pod>(&mut self) -> Result<usize> {
         let count = self.count::<T>()?;
-        self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)
+        self.skip((count * size_of::<T>()).next_multiple_of(ALIGNMENT) as u64)?;
+        Ok(count)
     }
 
     /// Returns `count` values of the last column from the one at `first` on, without reading the others.
     ///
     /// # Errors
     /// As [`ColumnReader::column`].
-    pub fn column_part<T: Pod>(mut self, first: usize, count: usize) -> Result<MappedSlice<'static, T>> {
+    pub fn column_part<T: Pod>(mut self, first: usize, count: usize) -> Result<Vec<T>> {
         let length = self.count::<T>()?;
         if first.checked_add(count).is_none_or(|end| end > length) {
             return Err(self.ends_too_early());
         }
-        self.store.read(self.key, self.rest.at + (first * size_of::<T>()) as u64, count)
+        self.store.read(self.key, self.rest.start + (first * size_of::<T>()) as u64, count)
     }
 
     /// Reads the number of values in the next column, and checks that the record holds them all.
     fn count<T: Pod>(&mut self) -> Result<usize> {
-        if self.rest.length < ALIGNMENT as u64 {
-            return Err(self.ends_too_early());
-        }
-        let count = self.store.read::<u128>(self.key, self.rest.at, 1)?[0];
+        let at = self.rest.start;
         self.skip(ALIGNMENT as u64)?;
-        let fits = count.checked_mul(size_of::<T>() as u128).is_some_and(|bytes| bytes <= self.rest.length as u128);
+        let count = self.store.read::<u128>(self.key, at, 1)?[0];
+        let left = u128::from(self.rest.end - self.rest.start);
+        let fits = count.checked_mul(size_of::<T>() as u128).is_some_and(|bytes| bytes <= left);
         if fits { Ok(count as usize) } else { Err(self.ends_too_early()) }
     }
 
     fn skip(&mut self, bytes: u64) -> Result<()> {
-        let RecordPlace { at, length } = self.rest;
-        let left = length.checked_sub(bytes).ok_or_else(|| self.ends_too_early())?;
-        self.rest = RecordPlace { at: at + bytes, length: left };
+        if self.rest.end - self.rest.start < bytes {
+            return Err(self.ends_too_early());
+        }
+        self.rest.start += bytes;
         Ok(())
     }
 

@@ -1,15 +1,14 @@
 //! The job directory, which holds everything that a job needs to go on, and the results beside it.
 
-use crate::durable::atomic_file::remove_file;
-use crate::durable::listing::{Leftovers, entries, is_folder, is_page_of_others};
-use crate::durable::lock::{Lock, lock_file};
+use crate::durable::atomic_file::{remove_file, remove_tree};
+use crate::durable::listing::{Leftovers, entries, is_folder};
+use crate::durable::lock::lock_file;
 use crate::durable::replacement::Replacement;
 use crate::index::PartIndex;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use sys::{Error, Result, disk};
+use sys::Result;
 use tiles::file_names::OutputFiles;
-use tiles::raster::products::RasterProduct;
 
 /// The number of files that the records of a store are dealt out to.
 pub const STORE_FILES: usize = 8;
@@ -108,39 +107,9 @@ impl JobDirectory {
         self.job.join("result")
     }
 
-    /// Returns the path of the file in which the blocks of a raster wait.
-    pub fn raster_blocks(&self, product: RasterProduct) -> PathBuf {
-        self.job.join(format!("{}.blocks", product.names()[1]))
-    }
-
-    /// Returns the path of the file in which map tiles wait.
-    pub fn waiting_map_tiles(&self) -> PathBuf {
-        self.job.join("map.tiles")
-    }
-
-    /// Returns the paths of the files in which the numbered mesh waits for its exports: vertices, triangles and colours.
-    pub fn exported_mesh(&self) -> [PathBuf; 3] {
-        ["exports.vertices", "exports.triangles", "exports.colors"].map(|name| self.job.join(name))
-    }
-
-    /// Returns the path of the file in which the pieces of contour lines wait.
-    pub fn contour_chains(&self) -> PathBuf {
-        self.job.join("contours.chains")
-    }
-
-    /// Returns the path of the file in which the boxes of contour lines wait.
-    pub fn contour_boxes(&self) -> PathBuf {
-        self.job.join("contours.boxes")
-    }
-
-    /// Returns the path of the file in which the pieces of terrain tiles wait.
-    pub fn terrain_pieces(&self) -> PathBuf {
-        self.job.join("terrain.pieces")
-    }
-
-    /// Returns the path of the file in which the terrain tiles of a zoom wait.
-    pub fn terrain_meshes(&self, zoom: u8) -> PathBuf {
-        self.job.join(format!("terrain.{zoom}.meshes"))
+    /// Returns the path of a file of this name in which a step keeps something until its results are written.
+    pub fn scratch(&self, name: &str) -> PathBuf {
+        self.job.join(name)
     }
 
     /// Returns the path of the journal of complete phases.
@@ -165,14 +134,6 @@ impl JobDirectory {
     pub fn point_files(&self) -> Result<Vec<(u16, PathBuf)>> {
         let number = |path: &Path| path.file_name()?.to_str()?.strip_suffix(".points")?.parse().ok();
         Ok(entries(&self.points)?.into_iter().filter_map(|path| Some((number(&path)?, path))).collect())
-    }
-
-    /// Removes the points.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if they cannot be removed.
-    pub fn remove_points(&self) -> Result<()> {
-        disk::remove_tree(&self.points).map_err(Error::io("remove", &self.points))
     }
 
     /// Looks at what is in this folder. A network file system that remembers what was not there is right from then on.
@@ -205,60 +166,36 @@ impl JobDirectory {
         !self.results.directory().join(name).starts_with(&self.job)
     }
 
-    /// Takes the lock of the job directory, which it creates if need be.
-    ///
-    /// # Errors
-    /// As [`Lock::take`].
-    pub fn lock(&self) -> crate::Result<Lock> {
-        Lock::take(&self.job)
-    }
-
-    /// Takes the lock of the folder of a part, or of the merges above the parts, which it creates if need be.
-    ///
-    /// # Errors
-    /// As [`Lock::take_within`].
-    pub fn lock_within(&self) -> crate::Result<Lock> {
-        Lock::take_within(&self.job)
-    }
-
-    /// Shares the lock of the job directory, which must be there, with other tasks of the job.
-    ///
-    /// # Errors
-    /// As [`Lock::share`].
-    pub fn share_lock(&self) -> crate::Result<Lock> {
-        Lock::share(&self.job)
-    }
-
-    /// Takes the lock, and removes everything that an interrupted run left.
-    ///
-    /// # Errors
-    /// As [`JobDirectory::lock`] and [`JobDirectory::clear`].
-    pub fn create(&self) -> crate::Result<Lock> {
-        let lock = self.lock()?;
-        remove_file(&self.journal())?;
-        self.clear(&HashSet::new())?;
-        Ok(lock)
-    }
-
     /// Removes what an earlier run left for its steps, and the results that wait, except the files that `keep` names as the journal
     /// does.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be removed.
     pub fn clear(&self, keep: &HashSet<PathBuf>) -> Result<()> {
-        let mut results = Leftovers::of(&self.waiting)?.files;
-        results.retain(|path| !keep.contains(&self.name(path)));
-        results.iter().try_for_each(|path| remove_file(path))?;
+        self.remove_files_but(keep, &[self.journal()])?;
         let folders = [self.parts(), self.points_by_part(), self.join().job];
-        folders.iter().try_for_each(|folder| disk::remove_tree(folder).map_err(Error::io("remove", folder)))?;
-        let stays = [self.journal(), lock_file(&self.job)];
+        folders.iter().try_for_each(|folder| remove_tree(folder))
+    }
+
+    /// Removes the results that wait, except those with these names, and the files that only a run needs that is under way.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be removed.
+    pub(crate) fn keep_results(&self, names: &HashSet<PathBuf>) -> Result<()> {
+        self.remove_files_but(names, &[self.journal(), self.plan(), self.first_plan()])
+    }
+
+    /// Removes the results that wait, and the files beside them, except those with these names, `own` and the lock.
+    fn remove_files_but(&self, names: &HashSet<PathBuf>, own: &[PathBuf]) -> Result<()> {
         // All names go, because other versions of the program use other names.
+        let mut files = Leftovers::of(&self.waiting)?.files;
         for path in entries(&self.job)? {
-            if !stays.contains(&path) && !is_folder(&path)? && !keep.contains(&self.name(&path)) {
-                remove_file(&path)?;
+            if path != lock_file(&self.job) && !own.contains(&path) && !is_folder(&path)? {
+                files.push(path);
             }
         }
-        Ok(())
+        files.retain(|path| !names.contains(&self.name(path)));
+        files.iter().try_for_each(|path| remove_file(path))
     }
 
     /// Puts the results with these `names`, which wait, in the place of the results of an earlier job. Goes on where an earlier call
@@ -270,30 +207,6 @@ impl JobDirectory {
         let on_the_way = keeps_waiting.then(|| self.on_the_way());
         let replacement = Replacement::prepare(&self.results, &self.waiting, names, on_the_way)?;
         replacement.map_or(Ok(()), |replacement| replacement.carry_out())
-    }
-
-    /// Tells whether somebody else's page is where that of the job is to be.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if it cannot be read.
-    pub fn has_page_of_others(&self) -> Result<bool> {
-        is_page_of_others(&self.results)
-    }
-
-    /// Removes the results that wait, except those with these names, and the files that only a run needs that is under way.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if a file cannot be removed.
-    pub(crate) fn keep_results(&self, names: &HashSet<PathBuf>) -> Result<()> {
-        let mut results = Leftovers::of(&self.waiting)?.files;
-        results.retain(|path| !names.contains(&self.name(path)));
-        let stay = [self.journal(), self.plan(), self.first_plan(), lock_file(&self.job)];
-        for path in entries(&self.job)? {
-            if !stay.contains(&path) && !is_folder(&path)? {
-                results.push(path);
-            }
-        }
-        results.iter().try_for_each(|path| remove_file(path))
     }
 
     /// Returns the paths of all results of an earlier job that may exist.
@@ -311,6 +224,7 @@ impl JobDirectory {
 mod tests {
     use super::*;
     use crate::durable::cleaning::remove_job;
+    use crate::durable::lock::Lock;
     use std::fs;
     use sys::ErrorKind;
     use tiles::checksums::{Checksum, list_text};
@@ -325,6 +239,14 @@ mod tests {
         fs::write(output.checksums(), list_text(&files)).unwrap();
     }
 
+    /// Takes the lock, and removes everything that an interrupted run left.
+    fn create(directory: &JobDirectory) -> crate::Result<Lock> {
+        let lock = Lock::take(directory.job())?;
+        remove_file(&directory.journal())?;
+        directory.clear(&HashSet::new())?;
+        Ok(lock)
+    }
+
     #[test]
     fn files_of_others_stay() {
         let output = tempfile::tempdir().unwrap();
@@ -337,7 +259,7 @@ mod tests {
         let old = output.path().join("tiles/000007.glb");
         theirs.iter().chain([&old]).for_each(|path| fs::write(path, "x").unwrap());
         write_list(directory.results(), &["tiles/000007.glb"]);
-        drop(directory.create().unwrap());
+        drop(create(&directory).unwrap());
         assert!(theirs.iter().all(|path| path.exists()) && old.exists());
         fs::create_dir_all(directory.output().directory()).unwrap();
         fs::write(directory.output().report(), "{}").unwrap();
@@ -347,9 +269,9 @@ mod tests {
         // A kill may leave an empty job directory: the next job may take it.
         remove_job(&directory).unwrap();
         fs::create_dir(output.path().join("job")).unwrap();
-        drop(directory.create().unwrap());
+        drop(create(&directory).unwrap());
         fs::rename(output.path().join("job/lock"), output.path().join("job/theirs")).unwrap();
-        let error = directory.create().unwrap_err();
+        let error = create(&directory).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Usage, "{error}");
     }
 
@@ -368,7 +290,7 @@ mod tests {
         for done in 0..=new.len() {
             let output = tempfile::tempdir().unwrap();
             let directory = JobDirectory::new(output.path());
-            let _lock = directory.create().unwrap();
+            let _lock = create(&directory).unwrap();
             let write = |folder: &OutputFiles, name: &str, text: &str| {
                 let path = folder.directory().join(name);
                 fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -426,7 +348,7 @@ mod tests {
     fn a_page_that_somebody_put_there_during_the_job_stays() {
         let output = tempfile::tempdir().unwrap();
         let directory = JobDirectory::new(output.path());
-        let _lock = directory.create().unwrap();
+        let _lock = create(&directory).unwrap();
         fs::create_dir_all(directory.output().directory()).unwrap();
         fs::write(directory.output().page(), "<html data-terrain=\"tileset.json\">").unwrap();
         fs::write(directory.output().report(), "{}").unwrap();
@@ -445,7 +367,7 @@ mod tests {
     fn a_file_that_somebody_put_in_the_place_of_a_result_stays() {
         let output = tempfile::tempdir().unwrap();
         let directory = JobDirectory::new(output.path());
-        let _lock = directory.create().unwrap();
+        let _lock = create(&directory).unwrap();
         [directory.output(), directory.results()].iter().for_each(|folder| fs::create_dir_all(folder.tiles()).unwrap());
         for (folder, text) in [(directory.output(), "new"), (directory.results(), "theirs")] {
             fs::write(folder.tile(0), text).unwrap();
@@ -472,11 +394,11 @@ mod tests {
     fn a_second_job_in_one_directory_is_refused() {
         let output = tempfile::tempdir().unwrap();
         let directory = JobDirectory::new(output.path());
-        let lock = directory.create().unwrap();
-        let error = directory.create().unwrap_err();
+        let lock = create(&directory).unwrap();
+        let error = create(&directory).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Retry);
         assert!(error.to_string().contains(&std::process::id().to_string()), "{error}");
         drop(lock);
-        directory.create().unwrap();
+        create(&directory).unwrap();
     }
 }

@@ -6,7 +6,7 @@
 //! Everything from the first damaged line on counts as never written. The job says what its header, its phases (`S`) and its
 //! records (`K`) are.
 
-use crate::durable::atomic_file::{PendingFile, publish, write_pending_lines};
+use crate::durable::atomic_file::{PendingFile, PendingWriter, publish};
 use crate::durable::directory::JobDirectory;
 use crate::durable::store::{RecordChanges, RecordKey, RecordRef};
 use serde::de::{DeserializeOwned, IgnoredAny};
@@ -261,13 +261,12 @@ impl<S: StepKey, K: RecordKey> Journal<S, K> {
         entries: Vec<JournalEntry<S, K>>,
     ) -> Result<Journal<S, K>> {
         let path = directory.journal();
-        write_pending_lines(
-            &path,
-            std::iter::once(to_line(header)).chain(entries.iter().map(|entry| to_line(&[entry]))),
-        )?;
+        let mut writer = PendingWriter::create(&path)?;
+        writer.write(to_line(header)?.as_bytes())?;
+        entries.iter().try_for_each(|entry| writer.write(to_line(&[entry])?.as_bytes()))?;
+        let end = writer.finish()?.bytes;
         publish(std::slice::from_ref(&path))?;
         let file = disk::open(&path).map_err(Error::io("open", &path))?;
-        let end = file.metadata().map_err(Error::io("read", &path))?.len();
         Ok(Journal::open(directory, entries, file, end))
     }
 
@@ -338,7 +337,11 @@ impl<S: StepKey, K: RecordKey> Journal<S, K> {
         interrupt::check()?;
         let (figures, files) = work()?;
         self.add_files(&files);
-        self.record(vec![JournalEntry::new(step, &figures, RecordChanges::default())?])?;
+        self.record(vec![JournalEntry::new(
+            step,
+            &figures,
+            RecordChanges { written: Vec::new(), dropped: Vec::new() },
+        )?])?;
         Ok(figures)
     }
 

@@ -63,25 +63,28 @@ impl Leftovers {
         Ok(left)
     }
 
+    /// Returns what is in a folder, if it is there.
+    fn enter(&mut self, folder: &Path) -> Result<Option<Vec<PathBuf>>> {
+        if is_folder(folder)? {
+            return entries(folder).map(Some);
+        }
+        self.no_folders.extend(exists(folder)?.then(|| folder.to_path_buf()));
+        Ok(None)
+    }
+
     /// Adds the files with this ending in a folder, if it is there, and partial ones. Their names are those of inputs.
     fn add_named_files(&mut self, (folder, ending): (PathBuf, &str)) -> Result<()> {
-        if !is_folder(&folder)? {
-            self.no_folders.extend(exists(&folder)?.then_some(folder));
-            return Ok(());
-        }
+        let Some(found) = self.enter(&folder)? else { return Ok(()) };
         let is_own = |path: &PathBuf| path.extension().is_some_and(|found| found == ending) || is_partial(path);
-        self.files.extend(entries(&folder)?.into_iter().filter(is_own));
+        self.files.extend(found.into_iter().filter(is_own));
         self.folders.push(folder);
         Ok(())
     }
 
     /// Adds what is in the folder of terrain tiles, or in a folder so many folders below, if it is there: zooms, columns, rows.
     fn add_terrain_tiles(&mut self, folder: &Path, depth: usize) -> Result<()> {
-        if !is_folder(folder)? {
-            self.no_folders.extend(exists(folder)?.then(|| folder.to_path_buf()));
-            return Ok(());
-        }
-        for path in entries(folder)? {
+        let Some(found) = self.enter(folder)? else { return Ok(()) };
+        for path in found {
             let is_numbered = path.file_stem().is_some_and(|stem| is_number(&stem.to_string_lossy()));
             let is_tile = path.extension().is_some_and(|ending| ending == "terrain") || is_partial(&path);
             match depth {
@@ -96,13 +99,8 @@ impl Leftovers {
 
     /// Adds what is in a folder of numbered files, if it is there. `below` names the folders that lead to it from that of its kind.
     fn add_folder(&mut self, folder: &Path, below: &mut Vec<String>, ending: &str) -> Result<()> {
-        if !is_folder(folder)? {
-            if exists(folder)? {
-                self.no_folders.push(folder.into());
-            }
-            return Ok(());
-        }
-        for path in entries(folder)? {
+        let Some(found) = self.enter(folder)? else { return Ok(()) };
+        for path in found {
             let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             if !is_number(&stem) {
                 continue;

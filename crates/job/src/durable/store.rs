@@ -9,7 +9,6 @@
 //! can be opened again after a kill, whatever the kill left behind the last known record.
 
 use crate::durable::directory::STORE_FILES;
-use crate::durable::mapped::MappedSlice;
 use bytemuck::Pod;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -18,6 +17,7 @@ use std::fmt::Debug;
 use std::fs::File;
 use std::hash::Hash;
 use std::io::{BufWriter, ErrorKind, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
@@ -46,13 +46,6 @@ fn hasher(key: impl RecordKey) -> Xxh3 {
     Xxh3::with_seed((kind as u64) << 32 | index as u64)
 }
 
-/// Where the bytes of a record are in its file.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RecordPlace {
-    pub(crate) at: u64,
-    pub(crate) length: u64,
-}
-
 /// A record as the journal knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RecordRef<K> {
@@ -75,8 +68,8 @@ impl<K: RecordKey> RecordRef<K> {
         self.length
     }
 
-    fn place(&self) -> RecordPlace {
-        RecordPlace { at: self.at, length: self.length }
+    fn place(&self) -> Range<u64> {
+        self.at..self.at + self.length
     }
 }
 
@@ -87,12 +80,6 @@ pub struct RecordChanges<K> {
     pub(crate) written: Vec<RecordRef<K>>,
     /// Those that the journal knows, and that are given up. The disk gets their space back once the journal knows this too.
     pub(crate) dropped: Vec<RecordRef<K>>,
-}
-
-impl<K> Default for RecordChanges<K> {
-    fn default() -> RecordChanges<K> {
-        RecordChanges { written: Vec::new(), dropped: Vec::new() }
-    }
 }
 
 /// The results of all steps of a job, on disk. Several threads may write and read at the same time.
@@ -113,12 +100,6 @@ struct Records<K> {
     written: HashSet<K>,
     /// Those that are given up, which the journal still knows.
     dropped: Vec<RecordRef<K>>,
-}
-
-impl<K> Default for Records<K> {
-    fn default() -> Records<K> {
-        Records { known: HashMap::new(), written: HashSet::new(), dropped: Vec::new() }
-    }
 }
 
 #[derive(Debug)]
@@ -147,7 +128,7 @@ impl<K: RecordKey> Store<K> {
         };
         let files = paths.into_iter().zip(ends).map(open).collect::<Result<_>>()?;
         let bytes = known.values().map(|record| record.length).sum();
-        let records = RwLock::new(Records { known, ..Records::default() });
+        let records = RwLock::new(Records { known, written: HashSet::new(), dropped: Vec::new() });
         Ok(Store { files, records, bytes: AtomicU64::new(bytes), peak: AtomicU64::new(bytes) })
     }
 
@@ -193,14 +174,11 @@ impl<K: RecordKey> Store<K> {
         &self.files[file_index(key)]
     }
 
-    fn hash(&self, key: K, place: RecordPlace) -> Result<u64> {
-        const BLOCK: u64 = 1 << 20;
+    fn hash(&self, key: K, place: Range<u64>) -> Result<u64> {
+        const BLOCK: usize = 1 << 20;
         let mut hasher = hasher(key);
-        let mut done = 0;
-        while done < place.length {
-            let block = self.read::<u8>(key, place.at + done, (place.length - done).min(BLOCK) as usize)?;
-            hasher.update(&block);
-            done += block.len() as u64;
+        for at in place.clone().step_by(BLOCK) {
+            hasher.update(&self.read::<u8>(key, at, BLOCK.min((place.end - at) as usize))?);
         }
         Ok(hasher.digest())
     }
@@ -234,7 +212,7 @@ impl<K: RecordKey> Store<K> {
     }
 
     /// Returns where the record of `key` is.
-    pub(crate) fn place(&self, key: K) -> Result<RecordPlace> {
+    pub(crate) fn place(&self, key: K) -> Result<Range<u64>> {
         let record = self.records().known.get(&key).map(RecordRef::place);
         record.ok_or_else(|| Error::Broken(format!("{} has no {key:?}", self.path(key).display())))
     }
@@ -245,14 +223,7 @@ impl<K: RecordKey> Store<K> {
     }
 
     /// Reads `count` values from byte `at` of the file of `key` on.
-    pub(crate) fn read<T: Pod>(&self, key: K, at: u64, count: usize) -> Result<MappedSlice<'static, T>> {
-        let store = self.file(key);
-        let outcome = fault::read("read-store").and_then(|()| MappedSlice::read(&store.file, at, count));
-        outcome.map_err(Error::io("read", &store.path))
-    }
-
-    /// Reads `count` values from byte `at` of the file of `key` on into memory of the caller's own.
-    pub(crate) fn read_vec<T: Pod>(&self, key: K, at: u64, count: usize) -> Result<Vec<T>> {
+    pub(crate) fn read<T: Pod>(&self, key: K, at: u64, count: usize) -> Result<Vec<T>> {
         let store = self.file(key);
         let mut values = vec![T::zeroed(); count];
         let bytes = bytemuck::cast_slice_mut(&mut values);
@@ -341,7 +312,7 @@ mod tests {
     }
 
     fn get(store: &Store<Key>, key: Key) -> Result<Vec<u32>> {
-        Ok(ColumnReader::open(store, key)?.column()?.to_vec())
+        ColumnReader::open(store, key)?.column()
     }
 
     fn paths(folder: &Path) -> [PathBuf; STORE_FILES] {
@@ -369,7 +340,7 @@ mod tests {
             let writer = ColumnWriter::default().push(&bytes).push(&words).push(&triples);
             writer.write(&store, Key::Leaf(0)).unwrap();
             let mut columns = ColumnReader::open(&store, Key::Leaf(0)).unwrap();
-            assert_eq!(columns.column_vec::<u8>().unwrap(), bytes);
+            assert_eq!(columns.column::<u8>().unwrap(), bytes);
             assert_eq!(*columns.column::<u128>().unwrap(), words);
             if length > 2 {
                 assert_eq!(*columns.column_part::<[u16; 3]>(2, length as usize - 2).unwrap(), triples[2..]);

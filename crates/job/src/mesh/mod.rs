@@ -1,6 +1,7 @@
 //! Steps 3 and 4: triangulates the leaves of the tree, and merges what they leave pending.
 
 pub mod final_triangles;
+pub(crate) mod ground_record;
 pub(crate) mod hull_flow;
 pub mod hull_rule;
 pub mod leaf;

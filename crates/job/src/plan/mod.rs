@@ -13,6 +13,7 @@ pub mod extent;
 pub(crate) mod far_points;
 pub mod fingerprint;
 pub(crate) mod first_plan;
+pub(crate) mod first_plan_file;
 pub(crate) mod flat_points;
 pub mod folder_files;
 pub(crate) mod geocentric_inputs;

@@ -7,3 +7,4 @@ pub(crate) mod input_places;
 pub(crate) mod kept_points;
 pub(crate) mod sampled_points;
 pub mod selection_estimate;
+pub(crate) mod stage_costs;

@@ -1,12 +1,11 @@
 //! Writing the files beside the tiles: the georeference, the preview, the tilesets and `terrain.glb`.
 
 use crate::durable::atomic_file::{
-    PendingFile, create_folder_of, find_pending, partial_path, write_pending, write_pending_lines,
+    PendingFile, PendingWriter, create_folder_of, find_pending, partial_path, write_pending,
 };
 use crate::durable::columns::ColumnReader;
 use crate::durable::directory::JobDirectory;
 use crate::index::TileIndex;
-use crate::partition::tree::Tree;
 use crate::publish::flat_tile::FlatScene;
 use crate::records::{StepRecord, Store};
 use breaklines::Breaklines;
@@ -68,8 +67,9 @@ pub(crate) fn write_side_files(
         files.extend(pending_tilesets(directory, frame, root, content.copyright)?);
     }
     if let Some((breaklines, lattice)) = &content.breaklines {
-        write_pending_lines(&output.breaklines(), lines_of(breaklines, lattice).map(Ok))?;
-        files.push(find_pending(&output.breaklines())?);
+        let mut writer = PendingWriter::create(&output.breaklines())?;
+        lines_of(breaklines, lattice).try_for_each(|line| writer.write(line.as_bytes()))?;
+        files.push(writer.finish()?);
     }
     if content.page {
         let opened = if content.tileset.is_some() { output.tileset() } else { output.terrain() };
@@ -117,20 +117,6 @@ pub(crate) trait EachTile: Sync {
     /// # Errors
     /// Those of `visit`, and of opening a store.
     fn visit(&self, visit: &mut dyn FnMut(&Store, TileIndex) -> Result<()>) -> Result<()>;
-}
-
-/// The tiles of one part.
-pub(crate) struct StoredTiles<'a> {
-    /// Has their records.
-    pub store: &'a Store,
-    /// The tree whose leaves they are.
-    pub tree: &'a Tree,
-}
-
-impl EachTile for StoredTiles<'_> {
-    fn visit(&self, visit: &mut dyn FnMut(&Store, TileIndex) -> Result<()>) -> Result<()> {
-        self.tree.tiles().try_for_each(|tile| visit(self.store, tile))
-    }
 }
 
 /// Returns the preview as PNG.

@@ -1,6 +1,7 @@
 //! The tiles that are written: what step 8 makes of them, and what the user should know.
 
 use crate::durable::directory::JobDirectory;
+use crate::durable::listing::is_page_of_others;
 use crate::merge_records::HullCount;
 use crate::plan::job_plan::Plan;
 use crate::plan::no_points::no_triangle;
@@ -108,7 +109,7 @@ impl<'a> WrittenTiles<'a> {
         } else if output.imagery.is_some() && placement.is_none() {
             warnings.push("the page shows no imagery, because the terrain is not on the globe".to_string());
         }
-        let page_of_others = output.page && directory.has_page_of_others()?;
+        let page_of_others = output.page && is_page_of_others(directory.results())?;
         if page_of_others {
             warnings.push(format!(
                 "the page is not written: {} appeared during the job, and is not a page of gdt-batch; fix: remove it, and \

@@ -9,11 +9,13 @@ use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours
 use crate::options::{JobOptions, RunOptions};
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
+use crate::plan::first_plan_file::has_first_plan;
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::plan::make_plan::are_there_far_points;
 use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::contour_estimate::ContourSample;
 use crate::preflight::kept_points::KeptPoints;
+use crate::preflight::stage_costs::stage_costs;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
 use crate::report::change_counts::ChangeCounts;
@@ -25,9 +27,7 @@ use crate::run::job::Process;
 use crate::run::part_entries::PartEntries;
 use crate::run::phases::do_phases;
 use crate::run::phases::plan_phase::{find_plan, note_skipped};
-use crate::run::phases::stage_costs::stage_costs;
 use crate::run::update::changes::{end_without_changes, mark_placed};
-use crate::run::update::first_plan_file::has_first_plan;
 use crate::run::update::mending::Mended;
 use crate::run::whole_run::WholeRun;
 use crate::{Error, Result};
@@ -71,7 +71,7 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
     let (mut lock, mut earlier) = (None, None);
     if !entries(directory.job())?.is_empty() {
         // Before anything else can fail: an earlier run may have been cut off while its results took their places.
-        lock = Some(directory.lock()?);
+        lock = Some(Lock::take(directory.job())?);
         earlier = read_earlier(&directory, run)?;
         if earlier.is_none() && options.updates && has_first_plan(&directory)? {
             let path = directory.journal();
@@ -200,7 +200,7 @@ fn attempt(
     let lock_of_job = match lock {
         Some(lock) => lock,
         None => {
-            let lock = directory.lock()?;
+            let lock = Lock::take(directory.job())?;
             // Another process may have begun the job, and stopped, since this one looked.
             earlier = read_earlier(directory, run)?;
             lock

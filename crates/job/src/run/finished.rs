@@ -5,6 +5,7 @@ use crate::durable::cleaning::remove_job;
 use crate::durable::directory::JobDirectory;
 use crate::durable::journal;
 use crate::durable::listing::{entries, exists, read_if_there};
+use crate::durable::lock::Lock;
 use crate::options::JobOptions;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
@@ -128,7 +129,7 @@ pub(crate) fn remove_rest(directory: &JobDirectory, threads: usize) -> crate::Re
     if !is_rest(directory)? {
         return Ok(());
     }
-    let _lock = directory.lock()?;
+    let _lock = Lock::take(directory.job())?;
     // Another process may have begun a job meanwhile.
     if is_rest(directory)? {
         on_threads(threads, || remove_job(directory))?;

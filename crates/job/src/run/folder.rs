@@ -77,7 +77,7 @@ impl Folder {
     /// [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
     pub(crate) fn open(job: &Job, part: PartIndex, key: u64) -> crate::Result<Folder> {
         let (clock, directory) = (JobClock::start(), job.folder(part));
-        let lock = directory.lock_within()?;
+        let lock = Lock::take_within(directory.job())?;
         let journal = Journal::go_on(&directory, &job.header(part))?;
         let store = Store::open(directory.store(), journal.records())?;
         let (syncs, recording) = (job.syncs(), Mutex::default());

@@ -2,6 +2,7 @@
 
 use crate::durable::atomic_file::remove_file;
 use crate::durable::directory::JobDirectory;
+use crate::durable::lock::Lock;
 use crate::index::PartIndex;
 use crate::partition::parts::Parts;
 use crate::partition::result::Partition;
@@ -103,7 +104,7 @@ impl<'a> Job<'a> {
         keep: impl Fn(JournalEntry) -> Result<Option<JournalEntry>>,
     ) -> crate::Result<()> {
         self.close(part);
-        let _lock = self.folder(part).lock_within()?;
+        let _lock = Lock::take_within(self.folder(part).job())?;
         let PartEntries { directory, header, entries } = self.entries(part)?;
         let names = |entries: &[JournalEntry]| -> HashSet<PathBuf> {
             entries.iter().flat_map(|entry| &entry.files).map(|file| file.name.clone()).collect()

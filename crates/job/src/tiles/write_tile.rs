@@ -12,6 +12,7 @@ use crate::tiles::style::TileStyle;
 use crate::tiles::tile_content::{BorderOf, TileContent};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
+use std::iter::Sum;
 use std::ops::AddAssign;
 use std::path::Path;
 use sys::Result;
@@ -39,6 +40,15 @@ pub(crate) struct TileStats {
     pub without_pixel: u64,
     /// Bytes of the GLB files, including those of triangles that are left out.
     pub bytes: u64,
+}
+
+impl Sum for TileStats {
+    fn sum<I: Iterator<Item = TileStats>>(each: I) -> TileStats {
+        each.fold(TileStats::default(), |mut sum, stats| {
+            sum += stats;
+            sum
+        })
+    }
 }
 
 impl AddAssign for TileStats {

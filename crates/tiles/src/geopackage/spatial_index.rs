@@ -65,7 +65,7 @@ fn up(exact: f64) -> f32 {
 /// The boxes of all lines. They wait in a file until their number is known.
 pub(super) struct IndexBoxes<'a> {
     file: &'a File,
-    writer: BufWriter<WriteFrom<'a>>,
+    writer: BufWriter<WriteFrom<&'a File>>,
     count: u64,
 }
 

@@ -96,7 +96,7 @@ impl<'a> ContourWork<'a> {
 
     /// Traces all levels through all tiles.
     fn trace(&self, directory: &JobDirectory, done: &(dyn Fn(u64) + Sync)) -> Result<FinishedChains> {
-        let waiting = WaitingChains::create(&directory.contour_chains())?;
+        let waiting = WaitingChains::create(&directory.scratch("contours.chains"))?;
         let extras = self.frame.extras();
         let plane = Plane { offset: [extras.offset[0], extras.offset[1]], step: extras.resolution };
         self.tiles.par_iter().with_max_len(1).try_for_each(|tile| {
@@ -116,7 +116,7 @@ impl<'a> ContourWork<'a> {
         chains: &mut FinishedChains,
         done: &(dyn Fn(u64) + Sync),
     ) -> Result<(ContourStats, Vec<PendingFile>)> {
-        let (path, boxes_path) = (directory.output().contours(), directory.contour_boxes());
+        let (path, boxes_path) = (directory.output().contours(), directory.scratch("contours.boxes"));
         create_folder_of(&path)?;
         let partial = partial_path(&path);
         let create = |path| disk::create(path).map_err(Error::io("create", path));

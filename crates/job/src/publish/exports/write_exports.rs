@@ -46,6 +46,9 @@ pub(crate) struct Exports {
     pub(crate) warnings: Vec<String>,
 }
 
+/// The files in which the numbered mesh waits: vertices, triangles and colours.
+const FILES: [&str; 3] = ["exports.vertices", "exports.triangles", "exports.colors"];
+
 /// The exports that are to be written.
 pub(crate) struct ExportWork<'a> {
     plan: &'a Plan,
@@ -106,7 +109,7 @@ impl<'a> ExportWork<'a> {
             return Ok((exports, Vec::new()));
         }
         let has_colors = self.formats.contains(&ExportFormat::Ply) && self.tiles_have_colors(directory)?;
-        let mut source = WaitingMesh::create(directory.exported_mesh(), has_colors, done)?;
+        let mut source = WaitingMesh::create(FILES.map(|name| directory.scratch(name)), has_colors, done)?;
         let numbers = self.number(directory, &mut source, done)?;
         let lines = self.plan.built_breaklines()?.as_deref().map(lines_of).unwrap_or_default();
         let mesh = Mesh {

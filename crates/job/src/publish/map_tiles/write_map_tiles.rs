@@ -102,7 +102,7 @@ impl<'a> MapTileWork<'a> {
     ) -> Result<(MapTileStats, Vec<PendingFile>)> {
         let path = directory.output().map_tiles();
         create_folder_of(&path)?;
-        let waiting = WaitingTiles::create(&directory.waiting_map_tiles())?;
+        let waiting = WaitingTiles::create(&directory.scratch("map.tiles"))?;
         let memory = working_memory(&self.plan.options);
         let cells = RasterCells::new(self.options, self.files(directory)?, kept_blocks(memory) as usize);
         let way = |pixel: [f64; 2]| self.map.cell_of_pixel(pixel);

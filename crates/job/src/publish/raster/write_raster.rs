@@ -174,7 +174,10 @@ impl<'a> RasterWork<'a> {
             return Ok(None);
         }
         let levels = part.grid.levels();
-        let create = |product| Ok((product, WaitingBlocks::create(&directory.raster_blocks(product), &levels)?));
+        let create = |product: RasterProduct| {
+            let path = directory.scratch(&format!("{}.blocks", product.names()[1]));
+            Ok((product, WaitingBlocks::create(&path, &levels)?))
+        };
         let rasters = self.options.products.iter().map(create).collect::<Result<Vec<_>>>()?;
         let window_level = window_level(working_memory(&self.plan.options)).min(levels.len() - 1);
         let read = |tile: TileIndex| self.mesh(directory, tile);

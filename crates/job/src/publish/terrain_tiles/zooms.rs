@@ -51,7 +51,7 @@ impl Zoom {
         finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         list.sort_unstable();
-        let file = WaitingRecords::at(&directory.terrain_meshes(zoom))?;
+        let file = WaitingRecords::at(&directory.scratch(&format!("terrain.{zoom}.meshes")))?;
         let groups: Vec<&[WaitingPiece]> = list.chunk_by(|a, b| a.0 == b.0).collect();
         let made = groups.par_iter().with_max_len(1).map(|group| {
             interrupt::check()?;
@@ -94,7 +94,7 @@ impl Zoom {
         finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         let zoom = self.zoom.saturating_sub(1);
-        let file = WaitingRecords::at(&directory.terrain_meshes(zoom))?;
+        let file = WaitingRecords::at(&directory.scratch(&format!("terrain.{zoom}.meshes")))?;
         let mut by_parent: Vec<(Tile, &WaitingTile)> =
             self.tiles.iter().map(|tile| (tile.tile.parent(), tile)).collect();
         by_parent.sort_unstable_by_key(|(parent, child)| (*parent, child.tile));

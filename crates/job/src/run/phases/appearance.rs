@@ -31,8 +31,8 @@ pub(crate) fn early_appearance(job: &Job) -> Result<Option<Arc<TileAppearance>>>
         MaxEdge::Auto => Ok(None),
         choice => {
             // No rule but "auto" looks at the sites.
-            let rule = MaxEdgeRule::new(choice, &job.plan.frame, 0, bounds(job)?, &|_| Ok(()))?;
-            appearance(job, rule).map(|appearance| Some(Arc::new(appearance)))
+            let rule = MaxEdgeRule::new(choice, &job.plan.frame, 0, claims(job)?.bounds, &|_| Ok(()))?;
+            appearance(job, rule).map(Some)
         }
     }
 }
@@ -66,17 +66,13 @@ pub(crate) fn final_appearance(job: &Job, all: SitesOfParts, store: &Store) -> R
     if let Some(appearance) = early_appearance(job)? {
         return Ok(appearance);
     }
-    let counts = ColumnReader::open(store, StepRecord::Spacing)?.column_vec()?;
-    appearance(job, MaxEdgeRule::of_counts(all.sites, all.bounds, counts)?).map(Arc::new)
+    let counts = ColumnReader::open(store, StepRecord::Spacing)?.column()?;
+    appearance(job, MaxEdgeRule::of_counts(all.sites, all.bounds, counts)?)
 }
 
-fn appearance(job: &Job, rule: MaxEdgeRule) -> Result<TileAppearance> {
+fn appearance(job: &Job, rule: MaxEdgeRule) -> Result<Arc<TileAppearance>> {
     let Claims { bounds, max_rgb } = claims(job)?;
-    TileAppearance::new(job.plan, max_rgb, bounds, rule)
-}
-
-fn bounds(job: &Job) -> Result<Bounds<3>> {
-    claims(job).map(|claims| claims.bounds)
+    TileAppearance::new(job.plan, max_rgb, bounds, rule).map(Arc::new)
 }
 
 fn claims(job: &Job) -> Result<Claims> {

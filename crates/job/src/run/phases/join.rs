@@ -3,14 +3,15 @@
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::merge_records::{HullCount, Seam, SeamOfTile};
 use crate::mesh::merge::merge_frontiers;
+use crate::partition::part_points::ReadInputs;
 use crate::partition::tree::{NodeKind, Tree};
 use crate::plan::budget::merge_memory;
-use crate::progress::stats::StageStats;
 use crate::records::{JobStep, StepRecord, Store};
 use crate::run::folder::{Folder, once};
 use crate::run::job::{Job, OpenPart};
-use crate::run::part_entries::Done;
+use crate::run::meshed_part::MeshedPart;
 use crate::run::phases::appearance::{SitesOfParts, count_sites, early_appearance, final_appearance};
+use crate::run::phases::read_phase::sum_up;
 use crate::tiles::appearance::TileAppearance;
 use crate::tiles::dependencies::FinishedTile;
 use crate::tiles::seam::seam_of;
@@ -26,9 +27,6 @@ pub(crate) struct JoinedParts {
     store: Option<Store>,
     /// How tiles look, now that all sites are known.
     pub(crate) appearance: Arc<TileAppearance>,
-    pub(crate) stages: Vec<StageStats>,
-    /// The largest resident set of the process that merged, in bytes.
-    pub(crate) peak_memory: Option<u64>,
     /// The key of the rule for long triangles, with `--update`.
     key_of_rule: u64,
 }
@@ -38,17 +36,24 @@ fn is_needed(job: &Job) -> bool {
     job.parts.all().len() > 1 || job.plan.options.output.max_edge == MaxEdge::Auto
 }
 
-/// Merges what the parts send up, or what an interrupted run left of it. `all` is what the parts hold.
+/// Merges what the parts send up, or what an interrupted run left of it. All of them are meshed.
 ///
 /// # Errors
-/// Those of [`merge_frontiers`]; [`crate::Error::InUse`] if another process does it.
-pub(crate) fn join_parts(job: &Job, all: SitesOfParts) -> crate::Result<()> {
+/// Those of [`sum_up`] and [`merge_frontiers`]; [`crate::Error::InUse`] if another process does it.
+pub(crate) fn join_parts(job: &Job) -> crate::Result<()> {
     if !is_needed(job) {
         return Ok(());
     }
     once(job, job.above(), JobStep::Join, key_of_meshes(job)?, |folder| {
         let parts = job.parts.all().len() as u64;
         let stage = job.progress.stage("join", parts, "parts");
+        let (mut sites, mut read) = (0, Vec::new());
+        for entries in job.parts.all().map(|part| job.entries(part)) {
+            let entries = entries?;
+            sites += entries.figures::<MeshedPart>(JobStep::Mesh)?.leaves.sites;
+            read.extend(entries.known::<ReadInputs>(JobStep::Read)?);
+        }
+        let all = SitesOfParts { sites, bounds: sum_up(job, read.iter())?.1 };
         merge_below(job, folder, NodeIndex::ROOT)?;
         count_sites(job, all, &folder.store)?;
         stage.advance(parts);
@@ -135,22 +140,16 @@ fn merge_at(job: &Job, folder: &Folder, node: NodeIndex, threads: usize) -> crat
 }
 
 impl JoinedParts {
-    fn with(store: Option<Store>, appearance: Arc<TileAppearance>) -> JoinedParts {
-        JoinedParts { store, appearance, stages: Vec::new(), peak_memory: None, key_of_rule: 0 }
-    }
-
     /// Opens what [`join_parts`] has left; `None` if it is not complete.
     ///
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on its folder.
     pub(crate) fn open(job: &Job) -> Result<Option<JoinedParts>> {
         if let (false, Some(appearance)) = (is_needed(job), early_appearance(job)?) {
-            return Ok(Some(JoinedParts::with(None, appearance)));
+            return Ok(Some(JoinedParts { store: None, appearance, key_of_rule: 0 }));
         }
         let entries = job.entries(job.above())?;
-        let Some(Done { figures: all, stages, peak_memory, .. }) = entries.done(JobStep::Join)? else {
-            return Ok(None);
-        };
+        let Some(all) = entries.known(JobStep::Join)? else { return Ok(None) };
         let store = entries.store()?;
         let tree = &job.parts.tree;
         // Without the seam of a node, that node and those above it would be holes in the terrain.
@@ -161,7 +160,7 @@ impl JoinedParts {
         let appearance = final_appearance(job, all, &store)?;
         let rule = if job.plan.options.updates { format!("{:?}", appearance.style.max_edge) } else { String::new() };
         let key_of_rule = xxh3_64(rule.as_bytes());
-        Ok(Some(JoinedParts { store: Some(store), appearance, stages, peak_memory, key_of_rule }))
+        Ok(Some(JoinedParts { store: Some(store), appearance, key_of_rule }))
     }
 
     /// Returns what is merged while parts are still to come.
@@ -170,7 +169,7 @@ impl JoinedParts {
     /// As [`JoinedParts::open`].
     pub(crate) fn so_far(job: &Job, appearance: Arc<TileAppearance>) -> Result<JoinedParts> {
         let store = is_needed(job).then(|| job.entries(job.above())?.store()).transpose()?;
-        Ok(JoinedParts::with(store, appearance))
+        Ok(JoinedParts { store, appearance, key_of_rule: 0 })
     }
 
     /// Returns what all seams have of `tile` of the part with `store` and `tree`.

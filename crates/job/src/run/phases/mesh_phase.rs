@@ -2,7 +2,7 @@
 //! finished.
 
 use crate::Result;
-use crate::durable::atomic_file::remove_file;
+use crate::durable::atomic_file::{remove_file, remove_tree};
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::mesh::leaf::LeafStats;
 use crate::partition::point_file::PointFiles;
@@ -35,7 +35,7 @@ pub(crate) fn mesh_one(
     let meshed = once(job, part, JobStep::Mesh, key, |folder| mesh(job, folder, part, appearance, others))?;
     match job.plan.options.updates {
         true => remove_divided_points(job, part)?,
-        false => job.folder(part).remove_points()?,
+        false => remove_tree(job.folder(part).points())?,
     }
     Ok(meshed)
 }

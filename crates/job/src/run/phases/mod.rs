@@ -16,7 +16,6 @@ mod postponed_merges;
 pub(crate) mod publish_phase;
 pub(crate) mod read_phase;
 pub(crate) mod select_phase;
-pub(crate) mod stage_costs;
 pub(crate) mod tile_phase;
 mod tile_queue;
 mod tree_walk;
@@ -26,12 +25,13 @@ use crate::Result;
 use crate::index::PartIndex;
 use crate::partition::part_points::ReadInputs;
 use crate::partition::parts::Parts;
+use crate::plan::first_plan_file::keep_first_plan;
 use crate::plan::job_plan::Plan;
 use crate::publish::written_tiles::wants_tileset;
 use crate::report::job_report::Report;
 use crate::run::job::Job;
 use crate::run::meshed_part::MeshedPart;
-use crate::run::phases::appearance::{SitesOfParts, early_appearance};
+use crate::run::phases::appearance::early_appearance;
 use crate::run::phases::join::{JoinedParts, join_parts};
 use crate::run::phases::level_phase::levels_of_part;
 use crate::run::phases::mesh_phase::mesh_one;
@@ -42,7 +42,6 @@ use crate::run::phases::read_phase::{read_for, sum_up};
 use crate::run::phases::select_phase::{select_vertices, selects};
 use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
 use crate::run::phases::waiting_tiles::WaitingTiles;
-use crate::run::update::first_plan_file::keep_first_plan;
 use crate::run::whole_run::WholeRun;
 use crate::tiles::write_tile::TileStats;
 
@@ -60,17 +59,14 @@ pub(crate) fn do_phases(run: &WholeRun, plan: Plan) -> Result<Report> {
         keep_first_plan(job.directory, plan)?;
     }
     // Steps 2 to 6 for each part, as far as it needs no later one.
-    let all = read_and_mesh(job)?;
+    read_and_mesh(job)?;
     // Step 4 for the nodes above the parts.
-    join_parts(job, all)?;
+    join_parts(job)?;
     let joined = JoinedParts::open(job)?.ok_or_else(|| sys::Error::Broken("the parts are not joined".into()))?;
     forget_outdated_tiles(job, &joined)?;
     // Steps 5 and 6 for the tiles that have waited.
     let borders = &ForeignBorders::new(job, &joined);
-    let mut tiles = TileStats::default();
-    for part in parts.all() {
-        tiles += finish_part(borders, part)?;
-    }
+    let tiles = parts.all().map(|part| finish_part(borders, part)).sum::<Result<TileStats>>()?;
     // Step 7 for each part.
     let has_tileset = wants_tileset(plan, &tiles);
     parts.all().try_for_each(|part| levels_of_part(job, &joined, part, has_tileset).map(|_| ()))?;
@@ -78,8 +74,8 @@ pub(crate) fn do_phases(run: &WholeRun, plan: Plan) -> Result<Report> {
     publish_job(run, job, &joined)
 }
 
-/// Reads and meshes all parts, or those that an interrupted run left. Returns what all of them hold.
-fn read_and_mesh(job: &Job) -> Result<SitesOfParts> {
+/// Reads and meshes all parts, or those that an interrupted run left.
+fn read_and_mesh(job: &Job) -> Result<()> {
     let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
     // Bytes of points that wait, by part.
     let mut waiting = vec![0; job.parts.all().len()];
@@ -114,6 +110,5 @@ fn read_and_mesh(job: &Job) -> Result<SitesOfParts> {
         front.as_mut().map(|front| front.pass(part, &done)).transpose()?;
         meshed.push(done);
     }
-    let (_, bounds) = sum_up(job, read.iter())?;
-    Ok(SitesOfParts { sites: meshed.iter().map(|part| part.leaves.sites).sum(), bounds })
+    sum_up(job, read.iter()).map(|_| ())
 }

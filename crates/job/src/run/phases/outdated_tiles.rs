@@ -8,7 +8,6 @@ use crate::run::job::Job;
 use crate::run::meshed_part::{SomeTiles, WaitedTile};
 use crate::run::part_entries::Done;
 use crate::run::phases::join::JoinedParts;
-use crate::tiles::write_tile::TileStats;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -66,8 +65,7 @@ fn without(
     }
     waited.retain(|tile| !outdated.contains(&tile.tile));
     written.retain(|tile| !outdated.contains(tile));
-    *stats = TileStats::default();
-    waited.iter().for_each(|tile| *stats += tile.stats);
+    *stats = waited.iter().map(|tile| tile.stats).sum();
     entry.files.retain(|file| !names.contains(&file.name));
     entry.changes.written.retain(|record| match record.key() {
         StepRecord::FinishedBorder(tile) | StepRecord::Pixels(tile) | StepRecord::Tile(tile) => {

@@ -13,7 +13,7 @@ use crate::publish::exports::write_exports::{ExportWork, Exports};
 use crate::publish::map_tiles::write_map_tiles::MapTileWork;
 use crate::publish::published::Published;
 use crate::publish::raster::write_raster::RasterWork;
-use crate::publish::side_files::{EachTile, StoredTiles, write_side_files};
+use crate::publish::side_files::{EachTile, write_side_files};
 use crate::publish::terrain_tiles::write_terrain::TerrainWork;
 use crate::publish::tileset_tree::TilesOfTree;
 use crate::publish::written_tiles::{WrittenTiles, check_some_triangles, wants_tileset};
@@ -43,11 +43,13 @@ pub(crate) fn publish_job(run: &WholeRun, job: &Job, joined: &JoinedParts) -> cr
     let (plan, directory) = (job.plan, job.directory);
     let parts = job.parts.all().map(|part| PartProgress::of(&job.entries(part)?));
     let parts = parts.collect::<Result<Vec<PartProgress>>>()?;
-    let figures = figures_of(&parts, joined)?;
+    let mut figures = figures_of(&parts)?;
     check_some_triangles(&figures.tiles, plan)?;
     let (summary, bounds) = sum_up(job, parts.iter().filter_map(|part| part.read.as_ref()))?;
-    let before = stages_of(&parts, &BEFORE_JOIN).chain(&joined.stages);
+    let join: Option<Done<IgnoredAny>> = job.entries(job.above())?.done(JobStep::Join)?;
+    let before = stages_of(&parts, &BEFORE_JOIN).chain(join.iter().flat_map(|join| &join.stages));
     before.chain(stages_of(&parts, &AFTER_JOIN)).for_each(|stage| run.add_stage(stage.clone()));
+    figures.peak_memory = figures.peak_memory.max(join.and_then(|join| join.peak_memory));
     let points: Vec<u64> = parts.iter().flat_map(|part| &part.mesh).map(|mesh| mesh.points).collect();
     let above = Hierarchy::above_parts(&job.parts.tree, &points, level_sizes(plan));
     let has_tileset = wants_tileset(plan, &figures.tiles);
@@ -111,8 +113,8 @@ fn stages_of<'a>(parts: &'a [PartProgress], steps: &'a [JobStep]) -> impl Iterat
 }
 
 /// Returns what all parts hold together.
-fn figures_of(parts: &[PartProgress], joined: &JoinedParts) -> Result<PartFigures> {
-    let mut all = PartFigures { parts: parts.len() as u64, peak_memory: joined.peak_memory, ..PartFigures::default() };
+fn figures_of(parts: &[PartProgress]) -> Result<PartFigures> {
+    let mut all = PartFigures { parts: parts.len() as u64, ..PartFigures::default() };
     let (mut together, mut by_tasks) = (0, false);
     for (number, part) in parts.iter().enumerate() {
         let (Some(mesh), Some(levels)) = (&part.mesh, part.levels) else {
@@ -195,7 +197,7 @@ impl EachTile for TilesOfParts<'_> {
     fn visit(&self, visit: &mut dyn FnMut(&Store, TileIndex) -> Result<()>) -> Result<()> {
         self.0.parts.all().try_for_each(|part| {
             let open = self.0.open(part)?;
-            StoredTiles { store: &open.store, tree: &open.partition.tree }.visit(visit)
+            open.partition.tree.tiles().try_for_each(|tile| visit(&open.store, tile))
         })
     }
 }

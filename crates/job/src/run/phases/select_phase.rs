@@ -3,6 +3,7 @@
 
 use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::index::PartIndex;
+use crate::mesh::ground_record::{load_ground, save_ground};
 use crate::mesh::hull_rule::HullRule;
 use crate::mesh::selection::{PartInBlocks, PointsInBlocks, WrittenPoints, error_bound, points_per_block};
 use crate::partition::part_points::{PointsOfPart, file_of_selected};
@@ -14,11 +15,10 @@ use crate::run::job::Job;
 use crate::run::phases::read_phase::{listed_points_of, points_of};
 use crate::{Error, Result};
 use delaunay::geometry::Site;
-use ground::{CellNumbers, Ground, GroundColumns};
+use ground::Ground;
 use selection::{Figures, Selection, select};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// What is known of a part once its vertices are selected.
@@ -93,10 +93,7 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
         blocks.save_as(&folder.store, StepRecord::Selected)?;
         if number == 0 {
             ColumnWriter::default().push(&on_ground).write(&folder.store, StepRecord::OnGround)?;
-            if let Some(GroundColumns { numbers, places, cells }) = source.ground().map(Ground::columns) {
-                let columns = ColumnWriter::default().push(&numbers).push(places).push_parts(&cells);
-                columns.write(&folder.store, StepRecord::Ground)?;
-            }
+            source.ground().map(|ground| save_ground(ground, &folder.store)).transpose()?;
         }
         temporary += blocks.bytes();
         let (blocks, digest) = (blocks.len(), digest);
@@ -137,16 +134,7 @@ pub(crate) fn know_selection(job: &Job) -> Result<()> {
 /// # Errors
 /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store of the first part.
 pub(crate) fn found_ground(job: &Job) -> sys::Result<Ground> {
-    let store = job.entries(PartIndex::FIRST)?.store()?;
-    let mut columns = ColumnReader::open(&store, StepRecord::Ground)?;
-    let (numbers, places) = (columns.column_vec()?, columns.column_vec()?);
-    let read = |range: Range<usize>| {
-        let mut columns = ColumnReader::open(&store, StepRecord::Ground)?;
-        columns.skip_column::<f64>()?;
-        columns.skip_column::<[i32; 2]>()?;
-        columns.column_part::<CellNumbers>(range.start, range.len())
-    };
-    Ground::of_columns(numbers, places, read)?.ok_or_else(|| sys::Error::Broken("the ground has no cells".into()))
+    load_ground(&job.entries(PartIndex::FIRST)?.store()?)
 }
 
 /// Returns a hash of the rule by which triangles along the hull may be slivers.

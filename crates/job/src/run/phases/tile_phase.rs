@@ -15,46 +15,38 @@ use crate::tiles::appearance::TileAppearance;
 use crate::tiles::border_normals::{finish_border_normals, finished_border};
 use crate::tiles::write_tile::{TileStats, write_tile};
 use rayon::prelude::*;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 use sys::{Result, interrupt};
+
+/// The tiles of a part that are not written yet, each with the tiles that must be finished before it, if they are known.
+pub(crate) type TilesBefore = BTreeMap<TileIndex, Option<Vec<TileIndex>>>;
+
+/// Returns the tiles of a part that are not written yet.
+pub(crate) fn waiting_tiles(OpenPart { partition, tiles, .. }: &OpenPart) -> TilesBefore {
+    let mut waiting: TilesBefore = partition.tree.tiles().map(|tile| (tile, None)).collect();
+    tiles.with_border.iter().for_each(|(tile, before)| _ = waiting.insert(*tile, Some(before.clone())));
+    tiles.written.iter().for_each(|tile| _ = waiting.remove(tile));
+    waiting
+}
 
 /// Writes the tiles of `part` that are not written yet. Returns the totals over all of them.
 ///
 /// # Errors
 /// Those of the steps; [`crate::Error::InUse`] if another process has the part.
 pub(crate) fn finish_part(borders: &ForeignBorders, part: PartIndex) -> crate::Result<TileStats> {
-    let job = borders.job;
-    let progress = PartProgress::of(&job.entries(part)?)?;
+    let progress = PartProgress::of(&borders.job.entries(part)?)?;
     if progress.has(Phase::Tiles) {
         return Ok(progress.tiles.stats);
     }
     let session = BorderSession::open(borders, part, progress.tiles_left())?;
     // What another process has written since is in the journal that is locked now.
-    let SomeTiles { stats: mut all, written, with_border, .. } = session.open.tiles.clone();
-    let written: HashSet<TileIndex> = written.into_iter().collect();
-    let mut with_border: HashMap<TileIndex, Vec<TileIndex>> = with_border.into_iter().collect();
-    let waiting: Vec<TileIndex> = session.partition().tree.tiles().filter(|tile| !written.contains(tile)).collect();
-    if waiting.is_empty() {
-        return Ok(all);
+    let (mut all, mut waiting) = (session.open.tiles.stats, waiting_tiles(&session.open));
+    if !waiting.is_empty() {
+        let written = session.write_ready(&mut waiting, &HashSet::new())?;
+        all += written.stats;
+        session.finish(written)?;
     }
-    let missing: Vec<TileIndex> = waiting.iter().copied().filter(|tile| !with_border.contains_key(tile)).collect();
-    with_border.extend(session.finish_borders(&missing)?);
-    let each = session.write_each(&waiting)?;
-    let stats = sum_of(each.iter().copied());
-    all += stats;
-    let waited = match job.plan.options.updates {
-        true => waiting
-            .par_iter()
-            .zip(each)
-            .map(|(&tile, stats)| {
-                let neighbours = with_border.get(&tile).cloned().unwrap_or_default();
-                Ok(WaitedTile { tile, stats, key: borders.joined.key_of_tile(job, tile)?, neighbours })
-            })
-            .collect::<Result<_>>()?,
-        false => Vec::new(),
-    };
-    session.finish(SomeTiles { stats, written: waiting, with_border: Vec::new(), waited })?;
     Ok(all)
 }
 
@@ -100,26 +92,42 @@ impl<'a> BorderSession<'a> {
         joined.seam_of(job, self.store(), &self.partition().tree, tile)
     }
 
-    /// Finishes the borders of `tiles`, which no merge can change any more. Returns each with the tiles that must be finished before it can
-    /// be written.
+    /// Finishes the borders of those of the `waiting` tiles that are not `open`, because no merge can change them any more. Writes those whose
+    /// neighbours are not open either, and takes them away.
     ///
     /// # Errors
-    /// Those of [`finish_border_normals`].
-    pub(crate) fn finish_borders(&self, tiles: &[TileIndex]) -> Result<Vec<(TileIndex, Vec<TileIndex>)>> {
+    /// Those of [`finish_border_normals`] and [`write_tile`].
+    pub(crate) fn write_ready(&self, waiting: &mut TilesBefore, open: &HashSet<TileIndex>) -> Result<SomeTiles> {
+        let finished = waiting.iter().filter(|(tile, before)| before.is_none() && !open.contains(tile));
+        let finished: Vec<TileIndex> = finished.map(|(tile, _)| *tile).collect();
+        let mut with_border = self.finish_borders(&finished)?;
+        with_border.iter().for_each(|(tile, before)| _ = waiting.insert(*tile, Some(before.clone())));
+        let is_ready = |before: &Vec<TileIndex>| before.iter().all(|other| !open.contains(other));
+        let ready: Vec<(TileIndex, Vec<TileIndex>)> =
+            waiting.iter().filter_map(|(tile, before)| Some((*tile, before.clone().filter(is_ready)?))).collect();
+        ready.iter().for_each(|(tile, _)| _ = waiting.remove(tile));
+        with_border.retain(|(tile, _)| waiting.contains_key(tile));
+        let written: Vec<TileIndex> = ready.iter().map(|(tile, _)| *tile).collect();
+        let each = self.write_each(&written)?;
+        let ForeignBorders { job, joined, .. } = *self.borders;
+        let waited = |((tile, neighbours), &stats): (&(TileIndex, Vec<TileIndex>), &TileStats)| {
+            Ok(WaitedTile { tile: *tile, stats, key: joined.key_of_tile(job, *tile)?, neighbours: neighbours.clone() })
+        };
+        let waited = match job.plan.options.updates {
+            true => ready.par_iter().zip(&each).map(waited).collect::<Result<_>>()?,
+            false => Vec::new(),
+        };
+        Ok(SomeTiles { stats: each.into_iter().sum(), written, with_border, waited })
+    }
+
+    /// Finishes the borders of `tiles`. Returns each with the tiles that must be finished before it can be written.
+    fn finish_borders(&self, tiles: &[TileIndex]) -> Result<Vec<(TileIndex, Vec<TileIndex>)>> {
         let (tree, style) = (&self.partition().tree, &self.borders.joined.appearance.style);
         let finish = |&tile: &TileIndex| {
             interrupt::check()?;
             Ok((tile, finish_border_normals(self.store(), tree, style, tile, &self.seam(tile)?)?))
         };
         tiles.par_iter().map(finish).collect()
-    }
-
-    /// Writes `tiles`, whose borders are finished. Returns the totals over them.
-    ///
-    /// # Errors
-    /// Those of [`write_tile`].
-    pub(crate) fn write_tiles(&self, tiles: &[TileIndex]) -> Result<TileStats> {
-        self.write_each(tiles).map(|each| sum_of(each.into_iter()))
     }
 
     /// Writes `tiles`, whose borders are finished. Returns the figures of each.
@@ -148,13 +156,6 @@ impl<'a> BorderSession<'a> {
         self.folder.record(JobStep::Tiles, some, vec![self.stage.finish()])?;
         Ok(self.folder.store.bytes())
     }
-}
-
-fn sum_of(each: impl Iterator<Item = TileStats>) -> TileStats {
-    each.fold(TileStats::default(), |mut sum, stats| {
-        sum += stats;
-        sum
-    })
 }
 
 /// How many borders of other parts stay in memory, some ten kilobytes each.

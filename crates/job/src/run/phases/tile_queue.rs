@@ -2,6 +2,7 @@
 
 use crate::index::TileIndex;
 use crate::partition::result::Partition;
+use crate::preflight::stage_costs::triangulated_share;
 use crate::progress::activity::Activity;
 use crate::progress::stage::Stage;
 use crate::progress::stats::StageStats;
@@ -9,7 +10,6 @@ use crate::records::FinishedBorder;
 use crate::run::folder::Folder;
 use crate::run::job::Job;
 use crate::run::meshed_part::SomeTiles;
-use crate::run::phases::stage_costs::triangulated_share;
 use crate::tiles::appearance::TileAppearance;
 use crate::tiles::border_normals::finish_border_normals;
 use crate::tiles::dependencies::{FinishedTile, TileDependencies};

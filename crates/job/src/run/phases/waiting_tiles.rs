@@ -5,16 +5,13 @@
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::records::StepRecord;
 use crate::run::job::Job;
-use crate::run::meshed_part::{MeshedPart, SomeTiles};
+use crate::run::meshed_part::MeshedPart;
 use crate::run::phases::join::{JoinedParts, merge_through};
-use crate::run::phases::tile_phase::{BorderSession, ForeignBorders};
+use crate::run::phases::tile_phase::{BorderSession, ForeignBorders, TilesBefore, waiting_tiles};
 use crate::tiles::appearance::TileAppearance;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 use sys::Result;
-
-/// The tiles of a part that are not written yet, each with the tiles that must be finished before it, if they are known.
-type TilesBefore = BTreeMap<TileIndex, Option<Vec<TileIndex>>>;
 
 /// A part with tiles that are not written yet.
 struct WaitingPart {
@@ -56,10 +53,7 @@ impl<'a> WaitingTiles<'a> {
         let opened = self.job.open(part)?;
         self.stored.insert(part, opened.store.bytes());
         self.open.extend(&meshed.open);
-        let SomeTiles { written, with_border, .. } = &opened.tiles;
-        let mut tiles: TilesBefore = opened.partition.tree.tiles().map(|tile| (tile, None)).collect();
-        with_border.iter().for_each(|(tile, before)| _ = tiles.insert(*tile, Some(before.clone())));
-        written.iter().for_each(|tile| _ = tiles.remove(tile));
+        let tiles = waiting_tiles(&opened);
         self.waiting
             .insert(part, WaitingPart { tiles, outer: meshed.open.iter().copied().collect(), is_kept: meshed.is_kept });
         drop(opened);
@@ -82,7 +76,7 @@ impl<'a> WaitingTiles<'a> {
             for (&part, WaitingPart { tiles, outer, is_kept }) in due {
                 let session = BorderSession::open(borders, part, tiles.len())?;
                 let before = session.store().bytes();
-                let some = write_ready(&session, tiles, open)?;
+                let some = session.write_ready(tiles, open)?;
                 if !*is_kept {
                     free_written(&session, &some.written, tiles.is_empty().then_some(&*outer))?;
                 }
@@ -94,22 +88,6 @@ impl<'a> WaitingTiles<'a> {
         self.waiting.retain(|_, part| !part.tiles.is_empty());
         Ok(())
     }
-}
-
-/// Finishes the borders of those of the `waiting` tiles that are not `open`, writes those whose neighbours are not open either, and takes
-/// them away.
-fn write_ready(session: &BorderSession, waiting: &mut TilesBefore, open: &HashSet<TileIndex>) -> Result<SomeTiles> {
-    let finished = waiting.iter().filter(|(tile, before)| before.is_none() && !open.contains(tile));
-    let finished: Vec<TileIndex> = finished.map(|(tile, _)| *tile).collect();
-    let with_border = session.finish_borders(&finished)?;
-    with_border.iter().for_each(|(tile, before)| _ = waiting.insert(*tile, Some(before.clone())));
-    let is_ready = |before: &Option<Vec<TileIndex>>| {
-        before.as_ref().is_some_and(|before| before.iter().all(|other| !open.contains(other)))
-    };
-    let written = waiting.iter().filter(|(_, before)| is_ready(before)).map(|(tile, _)| *tile);
-    let written: Vec<TileIndex> = written.collect();
-    written.iter().for_each(|tile| _ = waiting.remove(tile));
-    Ok(SomeTiles { stats: session.write_tiles(&written)?, written, with_border, waited: Vec::new() })
 }
 
 /// Gives up what `written` tiles needed. Once all tiles of a part are written, also what else no phase needs any more: all but the borders of

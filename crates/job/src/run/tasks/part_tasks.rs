@@ -13,11 +13,10 @@ use crate::publish::written_tiles::wants_tileset;
 use crate::run::attempt::{NO_LOCKS, may_coarsen};
 use crate::run::damage::{damaged_by_tasks, is_cut_off};
 use crate::run::job::{Job, Process};
-use crate::run::phases::appearance::{SitesOfParts, early_appearance};
+use crate::run::phases::appearance::early_appearance;
 use crate::run::phases::join::{JoinedParts, join_parts};
 use crate::run::phases::level_phase::levels_of_part;
 use crate::run::phases::mesh_phase::mesh_one;
-use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::read_phase::{read_for, sum_up};
 use crate::run::phases::select_phase::{know_selection, select_vertices, selects};
 use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
@@ -25,7 +24,6 @@ use crate::run::planned_job::PlannedJob;
 use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
 use crate::run::tasks::missing::{JobProgressByPart, not_planned, too_early};
-use crate::tiles::write_tile::TileStats;
 use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
 use sys::threads::on_threads;
@@ -87,7 +85,7 @@ fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
     let journal = directory.journal();
     let is_there = entries(directory.job())?.contains(&journal);
     let is_left = || single_process::is_noted(directory, submission);
-    if is_there || is_left()? { directory.share_lock().map(Some) } else { Ok(None) }
+    if is_there || is_left()? { Lock::share(directory.job()).map(Some) } else { Ok(None) }
 }
 
 /// A task of a phase that is done by parts, or of join.
@@ -171,13 +169,11 @@ impl PartTask<'_> {
 
     fn join(&self, job: &Job) -> Result<()> {
         let progress = JobProgressByPart::of(self.job)?;
-        let tasks = self.task.count;
-        progress.require(Phase::Read, tasks, |_| true)?;
-        progress.require(Phase::Mesh, tasks, |_| true)?;
-        let (_, bounds) = sum_up(job, progress.parts.iter().filter_map(|part| part.read.as_ref()))?;
+        [Phase::Read, Phase::Mesh]
+            .into_iter()
+            .try_for_each(|phase| progress.require(phase, self.task.count, |_| true))?;
         know_selection(job)?;
-        let mesh = progress.parts.iter().filter_map(|part| part.mesh.as_ref());
-        join_parts(job, SitesOfParts { sites: mesh.map(|mesh| mesh.leaves.sites).sum(), bounds })
+        join_parts(job)
     }
 
     fn tiles(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
@@ -193,7 +189,7 @@ impl PartTask<'_> {
         let progress = JobProgressByPart::of_parts(self.job, needs)?;
         let joined = self.joined(job)?;
         progress.require(Phase::Tiles, self.task.count, needs)?;
-        let has_tileset = wants_tileset(job.plan, &tiles_of(&progress.parts));
+        let has_tileset = wants_tileset(job.plan, &progress.parts.iter().map(|part| part.tiles.stats).sum());
         self.each(mine, |part| levels_of_part(job, &joined, part, has_tileset).map(|_| ()))
     }
 
@@ -201,11 +197,4 @@ impl PartTask<'_> {
         know_selection(job)?;
         JoinedParts::open(job)?.ok_or_else(|| too_early(Phase::Join, &[1], 1))
     }
-}
-
-/// Returns the totals over all tiles that are written.
-fn tiles_of(parts: &[PartProgress]) -> TileStats {
-    let mut all = TileStats::default();
-    parts.iter().for_each(|part| all += part.tiles.stats);
-    all
 }

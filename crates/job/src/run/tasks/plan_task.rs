@@ -2,6 +2,7 @@
 
 use crate::durable::directory::JobDirectory;
 use crate::durable::listing::exists;
+use crate::durable::lock::Lock;
 use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::options::{JobOptions, RunOptions};
 use crate::partition::parts::Parts;
@@ -34,7 +35,7 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
         return Ok(Some("the job is planned already".into()));
     }
     check_results_are_ours(directory, options.output.page)?;
-    let _lock = directory.lock()?;
+    let _lock = Lock::take(directory.job())?;
     let mut earlier = read_earlier(directory, run)?;
     if let Some(earlier) = earlier.as_mut()
         && let Some(what) = modified_inputs(earlier, &fingerprint)
@@ -81,7 +82,7 @@ fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u
     if !exists(&directory.journal())? {
         return Ok(false);
     }
-    let _lock = directory.share_lock()?;
+    let _lock = Lock::share(directory.job())?;
     let known = planned(directory, submission)?;
     let is_same = known.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
     Ok(is_same && Parts::of(&Plan::read(&directory.plan())?).all().len() > 1)
