@@ -16,7 +16,7 @@ use std::collections::{HashMap, HashSet};
 use std::fmt::Debug;
 use std::fs::File;
 use std::hash::Hash;
-use std::io::{BufRead, BufReader, ErrorKind, Write};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use sys::disk::WriteFrom;
@@ -139,76 +139,35 @@ fn to_line(value: &impl Serialize) -> Result<String> {
 }
 
 /// Returns the value of a line, or `None` if the line is damaged.
-fn parse_line<T: DeserializeOwned>(line: &str) -> Option<T> {
-    let (hash, text) = line.strip_suffix('\n')?.split_once(' ')?;
+fn parse_line<T: DeserializeOwned>(line: &[u8]) -> Option<T> {
+    let (hash, text) = std::str::from_utf8(line).ok()?.strip_suffix('\n')?.split_once(' ')?;
     let is_whole = u64::from_str_radix(hash, 16) == Ok(xxh3_64(text.as_bytes()));
     is_whole.then(|| serde_json::from_str(text).ok())?
 }
 
-/// The lines of a journal up to the first damaged one.
-struct JournalLines {
-    path: PathBuf,
-    reader: BufReader<File>,
-    line: Vec<u8>,
-    /// The bytes of the whole lines before the one that was read last.
-    before: u64,
-}
+/// The journal that an earlier run left: its header, unless that is damaged or of another version, its entries up to the first damaged line,
+/// and the number of bytes before that line.
+pub type ReadJournal<H, E> = (Option<H>, Vec<E>, u64);
 
-impl JournalLines {
-    /// Opens the journal that an earlier run left, if there is one.
-    fn open(directory: &JobDirectory) -> Result<Option<JournalLines>> {
-        const BUFFER: usize = 1 << 18;
-        let path = directory.journal();
-        match fault::read("read-journal").and_then(|()| File::open(&path)) {
-            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
-            file => {
-                let file = file.map_err(Error::io("read", &path))?;
-                Ok(Some(JournalLines {
-                    path,
-                    reader: BufReader::with_capacity(BUFFER, file),
-                    line: Vec::new(),
-                    before: 0,
-                }))
-            }
-        }
-    }
-
-    /// Returns the value of the next line, or `None` if there is none or it is damaged.
-    fn next<T: DeserializeOwned>(&mut self) -> Result<Option<T>> {
-        self.before += self.line.len() as u64;
-        self.line.clear();
-        self.reader.read_until(b'\n', &mut self.line).map_err(Error::io("read", &self.path))?;
-        Ok(std::str::from_utf8(&self.line).ok().and_then(parse_line))
-    }
-
-    /// Returns the entries in all lines to come.
-    fn entries<T: DeserializeOwned>(&mut self) -> Result<Vec<T>> {
-        let mut entries = Vec::new();
-        while let Some(mut complete) = self.next::<Vec<T>>()? {
-            entries.append(&mut complete);
-        }
-        Ok(entries)
-    }
-}
-
-/// The journal that an earlier run left: its header, unless that is damaged or of another version, and its entries up to the first
-/// damaged line.
-pub type ReadJournal<H, S, K> = (Option<H>, Vec<JournalEntry<S, K>>);
-
-/// Reads the journal that an earlier run left.
+/// Reads the journal that an earlier run left, with entries of type `E`.
 ///
 /// # Errors
 /// [`Error::Io`] if there is one that cannot be read.
-pub fn read<H, S, K>(directory: &JobDirectory) -> Result<Option<ReadJournal<H, S, K>>>
-where
-    H: DeserializeOwned,
-    S: StepKey,
-    K: RecordKey,
-{
-    let Some(mut lines) = JournalLines::open(directory)? else { return Ok(None) };
-    let header = lines.next()?;
-    let entries = if header.is_some() { lines.entries()? } else { Vec::new() };
-    Ok(Some((header, entries)))
+pub fn read<H: DeserializeOwned, E: DeserializeOwned>(directory: &JobDirectory) -> Result<Option<ReadJournal<H, E>>> {
+    let path = directory.journal();
+    let text = match fault::read("read-journal").and_then(|()| std::fs::read(&path)) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+        text => text.map_err(Error::io("read", &path))?,
+    };
+    let mut lines = text.split_inclusive(|byte| *byte == b'\n');
+    let first = lines.next().unwrap_or_default();
+    let (header, mut entries, mut end) = (parse_line(first), Vec::new(), first.len() as u64);
+    for line in lines.take_while(|_| header.is_some()) {
+        let Some(mut complete) = parse_line::<Vec<E>>(line) else { break };
+        entries.append(&mut complete);
+        end += line.len() as u64;
+    }
+    Ok(Some((header, entries, end)))
 }
 
 /// The files of an entry.
@@ -224,12 +183,8 @@ struct FilesOfStep {
 pub(crate) fn names_of_files(directory: &JobDirectory) -> Result<HashSet<PathBuf>> {
     let mut names = HashSet::new();
     for folder in [vec![directory.clone()], directory.folders_of_parts()?].concat() {
-        if let Some(mut lines) = JournalLines::open(&folder)?
-            && lines.next::<IgnoredAny>()?.is_some()
-        {
-            let files = lines.entries::<FilesOfStep>()?.into_iter().flat_map(|entry| entry.files);
-            names.extend(files.map(|file| file.name));
-        }
+        let entries = read::<IgnoredAny, FilesOfStep>(&folder)?.map(|(_, entries, _)| entries);
+        names.extend(entries.into_iter().flatten().flat_map(|entry| entry.files).map(|file| file.name));
     }
     Ok(names)
 }
@@ -278,15 +233,13 @@ impl<S: StepKey, K: RecordKey> Journal<S, K> {
     where
         H: Serialize + DeserializeOwned + PartialEq,
     {
-        let lines = JournalLines::open(directory)?.map(|mut lines| Ok((lines.next::<H>()?, lines))).transpose()?;
-        let Some((_, mut lines)) = lines.filter(|(found, _)| found.as_ref() == Some(header)) else {
-            return Journal::begin(directory, header, Vec::new());
-        };
-        let (path, entries) = (directory.journal(), lines.entries()?);
+        let read = read::<H, JournalEntry<S, K>>(directory)?.filter(|(found, ..)| found.as_ref() == Some(header));
+        let Some((_, entries, end)) = read else { return Journal::begin(directory, header, Vec::new()) };
+        let path = directory.journal();
         let file = disk::open(&path).map_err(Error::io("open", &path))?;
         // A kill may have cut the last line off.
-        disk::set_length(&file, lines.before).map_err(Error::io("write", &path))?;
-        Ok(Journal::open(directory, entries, file, lines.before))
+        disk::set_length(&file, end).map_err(Error::io("write", &path))?;
+        Ok(Journal::open(directory, entries, file, end))
     }
 
     fn open(directory: &JobDirectory, entries: Vec<JournalEntry<S, K>>, file: File, end: u64) -> Journal<S, K> {
@@ -412,10 +365,10 @@ mod tests {
     #[test]
     fn a_damaged_line_has_no_value() {
         let whole = to_line(&("step", 7)).unwrap();
-        assert_eq!(parse_line::<(String, u32)>(&whole), Some(("step".into(), 7)));
+        assert_eq!(parse_line::<(String, u32)>(whole.as_bytes()), Some(("step".into(), 7)));
         for end in 0..whole.len() {
-            assert_eq!(parse_line::<(String, u32)>(&whole[..end]), None, "{}", &whole[..end]);
+            assert_eq!(parse_line::<(String, u32)>(&whole.as_bytes()[..end]), None, "{}", &whole[..end]);
         }
-        assert_eq!(parse_line::<(String, u32)>(&whole.replace(",7]", ",8]")), None);
+        assert_eq!(parse_line::<(String, u32)>(whole.replace(",7]", ",8]").as_bytes()), None);
     }
 }

@@ -55,66 +55,46 @@ impl Leftovers {
         let partials: Vec<PathBuf> = files.iter().map(|path| partial_path(path)).collect();
         files.extend(partials);
         let mut left = Leftovers { files, ..Leftovers::default() };
+        let has_ending =
+            |path: &Path, ending: &str| path.extension().is_some_and(|found| found == ending) || is_partial(path);
         for (folder, ending) in output.numbered_folders() {
-            left.add_folder(&folder, &mut Vec::new(), ending)?;
+            let is_own = |below: &[String], stem: &str, path: &Path| {
+                is_number(stem) && has_ending(path, ending) && may_be_in(below, stem)
+            };
+            left.add_folder(&folder, &mut Vec::new(), MOST_FOLDERS_DEEP, &is_own)?;
         }
-        left.add_terrain_tiles(&output.terrain_tiles(), 0)?;
-        left.add_named_files(output.classified())?;
+        // Zooms, columns, rows.
+        let is_tile = |below: &[String], stem: &str, path: &Path| {
+            below.len() == 2 && is_number(stem) && has_ending(path, "terrain")
+        };
+        left.add_folder(&output.terrain_tiles(), &mut Vec::new(), 2, &is_tile)?;
+        // Their names are those of inputs.
+        let (folder, ending) = output.classified();
+        left.add_folder(&folder, &mut Vec::new(), 0, &|_, _, path| has_ending(path, ending))?;
         Ok(left)
     }
 
-    /// Returns what is in a folder, if it is there.
-    fn enter(&mut self, folder: &Path) -> Result<Option<Vec<PathBuf>>> {
-        if is_folder(folder)? {
-            return entries(folder).map(Some);
+    /// Adds those files in a folder, if it is there, and in the numbered folders so deep in it that `is_own` takes by the folders that lead to
+    /// them, their stem and their path. The folders `below` lead to this one.
+    fn add_folder(
+        &mut self,
+        folder: &Path,
+        below: &mut Vec<String>,
+        deep: usize,
+        is_own: &dyn Fn(&[String], &str, &Path) -> bool,
+    ) -> Result<()> {
+        if !is_folder(folder)? {
+            self.no_folders.extend(exists(folder)?.then(|| folder.to_path_buf()));
+            return Ok(());
         }
-        self.no_folders.extend(exists(folder)?.then(|| folder.to_path_buf()));
-        Ok(None)
-    }
-
-    /// Adds the files with this ending in a folder, if it is there, and partial ones. Their names are those of inputs.
-    fn add_named_files(&mut self, (folder, ending): (PathBuf, &str)) -> Result<()> {
-        let Some(found) = self.enter(&folder)? else { return Ok(()) };
-        let is_own = |path: &PathBuf| path.extension().is_some_and(|found| found == ending) || is_partial(path);
-        self.files.extend(found.into_iter().filter(is_own));
-        self.folders.push(folder);
-        Ok(())
-    }
-
-    /// Adds what is in the folder of terrain tiles, or in a folder so many folders below, if it is there: zooms, columns, rows.
-    fn add_terrain_tiles(&mut self, folder: &Path, depth: usize) -> Result<()> {
-        let Some(found) = self.enter(folder)? else { return Ok(()) };
-        for path in found {
-            let is_numbered = path.file_stem().is_some_and(|stem| is_number(&stem.to_string_lossy()));
-            let is_tile = path.extension().is_some_and(|ending| ending == "terrain") || is_partial(&path);
-            match depth {
-                2 if is_numbered && is_tile => self.files.push(path),
-                0 | 1 if is_numbered && path.extension().is_none() => self.add_terrain_tiles(&path, depth + 1)?,
-                _ => {}
-            }
-        }
-        self.folders.push(folder.into());
-        Ok(())
-    }
-
-    /// Adds what is in a folder of numbered files, if it is there. `below` names the folders that lead to it from that of its kind.
-    fn add_folder(&mut self, folder: &Path, below: &mut Vec<String>, ending: &str) -> Result<()> {
-        let Some(found) = self.enter(folder)? else { return Ok(()) };
-        for path in found {
+        for path in entries(folder)? {
             let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            if !is_number(&stem) {
-                continue;
-            }
-            match path.extension() {
-                None if below.len() < MOST_FOLDERS_DEEP => {
-                    below.push(stem);
-                    self.add_folder(&path, below, ending)?;
-                    below.pop();
-                }
-                Some(found) if (found == ending || is_partial(&path)) && may_be_in(below, &stem) => {
-                    self.files.push(path);
-                }
-                _ => {}
+            if below.len() < deep && path.extension().is_none() && is_number(&stem) {
+                below.push(stem);
+                self.add_folder(&path, below, deep, is_own)?;
+                below.pop();
+            } else if is_own(below, &stem, &path) {
+                self.files.push(path);
             }
         }
         self.folders.push(folder.into());

@@ -66,7 +66,7 @@ impl EarlierRun {
     /// # Errors
     /// [`Error::Io`] if one cannot be read.
     pub(crate) fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
-        let Some((header, entries)) = journal::read::<JobHeader, JobStep, _>(directory)? else { return Ok(None) };
+        let Some((header, entries, _)) = journal::read::<JobHeader, JournalEntry>(directory)? else { return Ok(None) };
         let parts = header.as_ref().map(|header| PartEntries::of_all(directory, header.id)).transpose()?;
         let (submission, parts) = (header.as_ref().map_or(0, |header| header.submission), parts.unwrap_or_default());
         let (is_complete, mended, has_dropped) = (false, None, false);

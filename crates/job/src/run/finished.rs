@@ -10,7 +10,7 @@ use crate::options::JobOptions;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
 use crate::progress::number_text::grouped;
-use crate::records::{JobStep, StepRecord};
+use crate::records::{JobStep, JournalEntry};
 use crate::report::job_report::Report;
 use crate::run::planned_job::planned;
 use crate::run::single_process;
@@ -116,8 +116,8 @@ pub(crate) fn is_rest(directory: &JobDirectory) -> Result<bool> {
     if entries(directory.job())?.is_empty() {
         return Ok(false);
     }
-    let journal = journal::read::<JobHeader, JobStep, StepRecord>(directory)?;
-    let is_over = journal.is_none_or(|(_, entries)| entries.iter().any(|entry| entry.step == JobStep::Report));
+    let journal = journal::read::<JobHeader, JournalEntry>(directory)?;
+    let is_over = journal.is_none_or(|(_, entries, _)| entries.iter().any(|entry| entry.step == JobStep::Report));
     Ok(!single_process::is_noted(directory, 0)? && is_over)
 }
 

@@ -6,7 +6,7 @@ use crate::durable::journal::{PublishedFile, records_of};
 use crate::index::PartIndex;
 use crate::partition::parts::Parts;
 use crate::progress::stats::StageStats;
-use crate::records::{JobStep, JournalEntry, StepRecord, Store};
+use crate::records::{JobStep, JournalEntry, Store};
 use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -70,8 +70,8 @@ impl PartEntries {
     fn find(directory: &JobDirectory, is_own: impl Fn(PartHeader) -> bool) -> Result<Option<PartEntries>> {
         // Another machine may have written it.
         directory.probe()?;
-        let read = journal::read::<PartHeader, JobStep, StepRecord>(directory)?;
-        let Some((Some(header), entries)) = read.filter(|(found, _)| found.is_some_and(&is_own)) else {
+        let read = journal::read::<PartHeader, JournalEntry>(directory)?;
+        let Some((Some(header), entries, _)) = read.filter(|(found, ..)| found.is_some_and(&is_own)) else {
             return Ok(None);
         };
         Ok(Some(PartEntries { directory: directory.clone(), header, entries }))

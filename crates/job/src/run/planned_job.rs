@@ -10,7 +10,7 @@ use crate::plan::fingerprint::{JobHeader, PLAN_AGAIN};
 use crate::plan::input_identity::InputChange;
 use crate::plan::inputs::input_paths;
 use crate::plan::job_plan::Plan;
-use crate::records::{JobStep, StepRecord};
+use crate::records::{JobStep, JournalEntry};
 use crate::run::part_entries::{PartEntries, PartHeader};
 use sys::{Error, Result};
 
@@ -81,8 +81,8 @@ pub(crate) fn planned(directory: &JobDirectory, submission: u64) -> Result<Optio
     // Other machines may have made the folders.
     directory.probe()?;
     entries(&directory.parts())?;
-    let read = journal::read::<JobHeader, JobStep, StepRecord>(directory)?;
-    let Some((Some(header), entries)) = read else { return Ok(None) };
+    let read = journal::read::<JobHeader, JournalEntry>(directory)?;
+    let Some((Some(header), entries, _)) = read else { return Ok(None) };
     let is_planned = |step: JobStep| entries.iter().any(|entry| entry.step == step);
     let mut own = entries.iter().flat_map(|entry| &entry.files).filter(|file| !directory.is_result(&file.name));
     let is_planned_and_whole = header.submission >= submission

@@ -17,8 +17,7 @@ use crate::tiles::seam::seam_of;
 use crate::tiles::write_tile::{TileStats, write_tile};
 use rayon::Scope;
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use sys::{Result, fault, interrupt};
 
 /// Finishes and writes tiles. Any thread may call its methods.
@@ -33,7 +32,8 @@ pub(crate) struct TileQueue<'a> {
     /// How tiles look; `None` if none may be written yet.
     appearance: Option<Arc<TileAppearance>>,
     state: Mutex<QueueState>,
-    has_failed: AtomicBool,
+    /// The first error.
+    failure: OnceLock<crate::Error>,
 }
 
 struct QueueState {
@@ -44,8 +44,6 @@ struct QueueState {
     written: Vec<TileIndex>,
     /// The tiles that are not written, but their borders are finished, and the neighbours of each.
     with_border: BTreeMap<TileIndex, Vec<TileIndex>>,
-    /// The first error.
-    failure: Option<crate::Error>,
 }
 
 impl<'a> TileQueue<'a> {
@@ -63,7 +61,6 @@ impl<'a> TileQueue<'a> {
             stats: TileStats::default(),
             written: Vec::new(),
             with_border: BTreeMap::new(),
-            failure: None,
         };
         TileQueue {
             folder,
@@ -74,7 +71,7 @@ impl<'a> TileQueue<'a> {
             write: job.progress.activity("write", "points"),
             appearance,
             state: Mutex::new(state),
-            has_failed: AtomicBool::new(false),
+            failure: OnceLock::new(),
         }
     }
 
@@ -96,14 +93,10 @@ impl<'a> TileQueue<'a> {
         &self,
         work: impl FnOnce() -> std::result::Result<T, E>,
     ) -> Option<T> {
-        if self.has_failed.load(Ordering::Relaxed) {
+        if self.failure.get().is_some() {
             return None;
         }
-        let keep = |error: E| {
-            self.state().failure.get_or_insert(error.into());
-            self.has_failed.store(true, Ordering::Relaxed);
-        };
-        work().map_err(keep).ok()
+        work().map_err(|error| _ = self.failure.set(error.into())).ok()
     }
 
     /// Ends the queue. Returns what became of the tiles, and those that merges above the part may change. Adds its stages.
@@ -111,11 +104,11 @@ impl<'a> TileQueue<'a> {
     /// # Errors
     /// The first error of all.
     pub(crate) fn finish(self, stages: &mut Vec<StageStats>) -> crate::Result<(SomeTiles, Vec<TileIndex>)> {
-        let QueueState { finished, stats, mut written, with_border, failure, .. } =
-            self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
-        if let Some(failure) = failure {
+        if let Some(failure) = self.failure.into_inner() {
             return Err(failure);
         }
+        let QueueState { finished, stats, mut written, with_border, .. } =
+            self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         stages.extend([self.border_normals.finish(), self.write.finish()]);
         let open = self.partition.tree.tiles().zip(finished).filter(|(_, finished)| !finished).map(|(tile, _)| tile);
         // The journal must not depend on the order in which threads end.

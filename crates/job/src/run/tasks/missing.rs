@@ -118,11 +118,7 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
     let directory = JobDirectory::new(&options.output.directory);
     if let InPlace::ThisJob(_) = results_in_place(&directory, options, 0)? {
         let has_rest = is_rest(&directory)?;
-        return Ok(of_each(
-            options,
-            tasks,
-            |phase| if phase == Phase::Publish && has_rest { vec![1] } else { Vec::new() },
-        ));
+        return Ok(of_each(options, tasks, |phase| publish_alone(phase, has_rest)));
     }
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
     let known = planned(&directory, 0)?;
@@ -141,17 +137,19 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
 /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the job directory.
 pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     let directory = JobDirectory::new(&options.output.directory);
-    let only_publish = || of_each(options, tasks, |phase| if phase == Phase::Publish { vec![1] } else { Vec::new() });
-    if single_process::is_noted(&directory, 0)? {
-        return Ok(only_publish());
-    }
-    match PlannedJob::open(&directory, options, 0)? {
-        Some(job) if !job.is_complete => {
+    let is_left_to_one = single_process::is_noted(&directory, 0)?;
+    let planned = if is_left_to_one { None } else { PlannedJob::open(&directory, options, 0)? };
+    match planned.filter(|job| !job.is_complete) {
+        Some(job) => {
             let progress = JobProgressByPart::of(&job)?;
             Ok(of_each(options, tasks, |phase| progress.missing_tasks(phase, tasks)))
         }
-        _ => Ok(only_publish()),
+        None => Ok(of_each(options, tasks, |phase| publish_alone(phase, true))),
     }
+}
+
+fn publish_alone(phase: Phase, is_missing: bool) -> Vec<u32> {
+    if phase == Phase::Publish && is_missing { vec![1] } else { Vec::new() }
 }
 
 fn of_each(options: &JobOptions, tasks: u32, missing: impl Fn(Phase) -> Vec<u32>) -> Vec<PhaseTasks> {
