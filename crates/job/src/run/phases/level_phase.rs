@@ -28,21 +28,34 @@ pub(crate) fn levels_of_part(
     part: PartIndex,
     has_tileset: bool,
 ) -> crate::Result<LevelStats> {
-    let key = key_of_tiles(job, &[part], has_tileset)?;
+    let hierarchy = hierarchy_of(job.plan, &job.open(part)?.partition);
+    // The store of the part grows, so what is open now must not be used again.
+    job.close(part);
+    let no_other = |other: PartIndex| Err(Error::Broken(format!("part {part} has no tile of part {other}")));
+    levels_over(job, joined, part, &hierarchy, has_tileset, &no_other)
+}
+
+/// Makes the coarser tiles of `hierarchy`, which is that of `part` or of the nodes above the parts, unless that is done. `top_of` returns the
+/// topmost tiles of other parts.
+///
+/// # Errors
+/// Those of [`make_levels`]; [`crate::Error::InUse`] if another process has the folder.
+pub(crate) fn levels_over(
+    job: &Job,
+    joined: &JoinedParts,
+    part: PartIndex,
+    hierarchy: &Hierarchy,
+    has_tileset: bool,
+    top_of: TopOf,
+) -> crate::Result<LevelStats> {
+    let key = key_of_tiles(job, part, has_tileset)?;
     if let Some(done) = done_with(job, part, JobStep::Levels, key)? {
         return Ok(done.figures);
     }
-    let open = job.open(part)?;
-    // The store of the part grows, so what is open now must not be used again.
-    job.close(part);
-    let hierarchy = hierarchy_of(job.plan, &open.partition);
-    forget_outdated_levels(job, part, &hierarchy, has_tileset)?;
-    once(job, part, JobStep::Levels, key, |folder| {
-        if !has_tileset {
-            return Ok(folder.record(JobStep::Levels, LevelStats::default(), Vec::new())?);
-        }
-        let no_other = |other: PartIndex| Err(Error::Broken(format!("part {part} has no tile of part {other}")));
-        make_levels(job, folder, part, &hierarchy, &joined.appearance.style, &no_other)
+    forget_outdated_levels(job, part, hierarchy, has_tileset)?;
+    once(job, part, JobStep::Levels, key, |folder| match has_tileset {
+        true => make_levels(job, folder, part, hierarchy, &joined.appearance.style, top_of),
+        false => Ok(folder.record(JobStep::Levels, LevelStats::default(), Vec::new())?),
     })
 }
 
@@ -57,7 +70,7 @@ pub(crate) fn hierarchy_of(plan: &Plan, partition: &Partition) -> Hierarchy {
 ///
 /// # Errors
 /// Those of [`make_level`]; [`Error::Io`] on the folder.
-pub(crate) fn make_levels(
+fn make_levels(
     job: &Job,
     folder: &Folder,
     part: PartIndex,

@@ -23,17 +23,17 @@ pub(crate) struct MadeLevel {
     pub(crate) stats: LevelStats,
 }
 
-/// Returns the key of the coarser tiles of these parts, with `--update`: a hash of the checksums of the exact ones, and of what coarser ones are
+/// Returns the key of the coarser tiles of `part`, or of those above the parts, with `--update`: a hash of the checksums of the exact ones, and of what coarser ones are
 /// made of them (none unless `has_tileset`). Else 0.
 ///
 /// # Errors
 /// [`sys::Error::Io`] if a journal cannot be read.
-pub(crate) fn key_of_tiles(job: &Job, parts: &[PartIndex], has_tileset: bool) -> sys::Result<u64> {
+pub(crate) fn key_of_tiles(job: &Job, part: PartIndex, has_tileset: bool) -> sys::Result<u64> {
     if !job.plan.options.updates {
         return Ok(0);
     }
     let mut hasher = hasher_of_levels(job, has_tileset);
-    for &part in parts {
+    for part in job.parts.all().filter(|below| *below == part || part == job.above()) {
         let entries = job.entries(part)?;
         let mut files: Vec<_> = entries.files(Some(JobStep::Tiles)).collect();
         files.sort_unstable_by(|a, b| a.name.cmp(&b.name));
@@ -78,7 +78,7 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
                     hasher.update(format!("{checksum}\n").as_bytes());
                 }
                 ChildTile::Coarse(finer) => hasher.update(&keys[finer].to_le_bytes()),
-                ChildTile::Part(part) => hasher.update(&key_of_tiles(job, &[part], true)?.to_le_bytes()),
+                ChildTile::Part(part) => hasher.update(&key_of_tiles(job, part, true)?.to_le_bytes()),
             }
         }
         keys[index] = hasher.digest();

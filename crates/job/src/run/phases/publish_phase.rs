@@ -19,12 +19,11 @@ use crate::publish::tileset_tree::TilesOfTree;
 use crate::publish::written_tiles::{WrittenTiles, check_some_triangles, wants_tileset};
 use crate::records::{JobStep, Store};
 use crate::report::job_report::{PartFigures, Report, ReportParts, SlowestPart};
-use crate::run::folder::{Folder, done_with};
 use crate::run::job::Job;
 use crate::run::part_entries::{Done, PartEntries};
 use crate::run::phases::join::JoinedParts;
-use crate::run::phases::level_phase::{hierarchy_of, make_levels};
-use crate::run::phases::outdated_levels::{forget_outdated_levels, key_of_tiles, level_sizes};
+use crate::run::phases::level_phase::{hierarchy_of, levels_over};
+use crate::run::phases::outdated_levels::{forget_outdated_levels, level_sizes};
 use crate::run::phases::part_progress::PartProgress;
 use crate::run::phases::read_phase::sum_up;
 use crate::run::phases::select_phase::found_ground;
@@ -160,24 +159,16 @@ fn levels_and_root(
     let root = if hierarchy.tiles.is_empty() {
         root_of_part(job, PartIndex::FIRST)?
     } else {
-        let key = key_of_tiles(job, &job.parts.all().collect::<Vec<PartIndex>>(), true)?;
-        let done: Option<Done<LevelStats>> = done_with(job, job.above(), JobStep::Levels, key)?;
-        if done.is_none() {
-            forget_outdated_levels(job, job.above(), hierarchy, true)?;
-        }
-        let folder = Folder::open(job, job.above(), key)?;
         let top_of = |part: PartIndex| {
             let open = job.open(part)?;
             Child::top(job.directory, &open.store, &open.partition.tree)
         };
-        levels = match done {
-            Some(done) => done.figures,
-            None => make_levels(job, &folder, tree.part, hierarchy, &joined.appearance.style, &top_of)?,
-        };
-        let done = folder.journal.figures_of::<Done<IgnoredAny>>(JobStep::Levels)?;
+        levels = levels_over(job, joined, job.above(), hierarchy, true, &top_of)?;
+        let entries = job.entries(job.above())?;
+        let done: Option<Done<IgnoredAny>> = entries.done(JobStep::Levels)?;
         done.into_iter().flat_map(|done| done.stages).for_each(|stage| run.add_stage(stage));
         let part_root = &|part: PartIndex| root_of_part(job, part);
-        TilesOfTree { store: &folder.store, tree, hierarchy, part_root }.root()?
+        TilesOfTree { store: &entries.store()?, tree, hierarchy, part_root }.root()?
     };
     let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
     Ok((root, levels))
