@@ -342,7 +342,7 @@ fn publish(
     drop(raster_work);
     let contours = write_contours(run, plan, &appearance.style.frame, written.tiles)?;
     let exports = write_exports(run, plan, &appearance.style.frame, written)?;
-    let terrain = write_terrain(run, plan, &appearance.style.frame, written.tiles)?;
+    let terrain = write_terrain(run, plan, &appearance.style.frame, &written)?;
     let classified = write_classified(run, job)?;
     let stage = run.progress.stage("publish", 1, "job");
     let output = &plan.options.output;
@@ -497,8 +497,13 @@ fn write_exports(run: &WholeRun, plan: &Plan, frame: &Frame, written: &WrittenFi
 ///
 /// # Errors
 /// Those of [`TerrainWork`].
-fn write_terrain(run: &WholeRun, plan: &Plan, frame: &Frame, tiles: &dyn EachTile) -> Result<Option<TerrainStats>> {
-    let Some(work) = TerrainWork::of(plan, frame, tiles)? else { return Ok(None) };
+fn write_terrain(
+    run: &WholeRun,
+    plan: &Plan,
+    frame: &Frame,
+    written: &WrittenFiles,
+) -> Result<Option<TerrainStats>> {
+    let Some(work) = TerrainWork::of(plan, frame, written.tiles, &written.stats)? else { return Ok(None) };
     let stage = run.progress.stage("terrain", work.steps(), "tiles");
     let stats = run.journal.step(JobStep::Terrain, || work.write(run.directory, &|steps| stage.advance(steps)))?;
     run.add_stage(stage.finish());
