@@ -497,12 +497,7 @@ fn write_exports(run: &WholeRun, plan: &Plan, frame: &Frame, written: &WrittenFi
 ///
 /// # Errors
 /// Those of [`TerrainWork`].
-fn write_terrain(
-    run: &WholeRun,
-    plan: &Plan,
-    frame: &Frame,
-    written: &WrittenFiles,
-) -> Result<Option<TerrainStats>> {
+fn write_terrain(run: &WholeRun, plan: &Plan, frame: &Frame, written: &WrittenFiles) -> Result<Option<TerrainStats>> {
     let Some(work) = TerrainWork::of(plan, frame, written.tiles, &written.stats)? else { return Ok(None) };
     let stage = run.progress.stage("terrain", work.steps(), "tiles");
     let stats = run.journal.step(JobStep::Terrain, || work.write(run.directory, &|steps| stage.advance(steps)))?;
