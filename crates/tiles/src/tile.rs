@@ -1,6 +1,7 @@
 //! The content of one tile, in lattice steps and source axes.
 
 use crate::attributes::PointAttributes;
+use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, bounds_of};
 use multiversion::multiversion;
 
@@ -21,14 +22,13 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Returns twice the area of all triangles in the plane, in square lattice steps. It is exact below 2^53.
-    pub fn double_area(&self) -> f64 {
-        let site = |corner: u32| self.positions[corner as usize].map(i128::from);
-        let area = |triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(site);
-            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    /// Returns twice the area of all triangles in the plane, in square lattice steps.
+    pub fn double_area(&self) -> u64 {
+        let site = |corner: u32| {
+            let [x, y, _] = self.positions[corner as usize];
+            [x, y]
         };
-        self.triangles.iter().map(area).sum::<i128>() as f64
+        self.triangles.iter().map(|&[a, b, c]| orient2d(site(a), site(b), site(c)).unsigned_abs()).sum()
     }
 
     /// Returns the tile of these triangles between some of `positions`, without normals and colours. Vertices keep their order.

@@ -9,7 +9,7 @@ type Sides = [[f64; 2]; 2];
 
 /// Returns how much of the clip, of the bounds, or of what both have in common, triangles of this area cover; `None` without either, or if
 /// polygons may overlap. The area is doubled, in square lattice steps.
-pub(crate) fn covered_share(plan: &Plan, double_area: f64) -> Option<f64> {
+pub(crate) fn covered_share(plan: &Plan, double_area: u64) -> Option<f64> {
     let (places, parts) = plan.lattice.for_places();
     let bounds = plan.options.input.bounds.map(|bounds| in_steps(bounds.0, &places));
     let wanted = match (&plan.clip, bounds) {
@@ -19,7 +19,7 @@ pub(crate) fn covered_share(plan: &Plan, double_area: f64) -> Option<f64> {
         (None, None) => return None,
     };
     // Triangles along a clip reach a little over its corners.
-    let covered = double_area * (parts * parts) as f64;
+    let covered = double_area as f64 * (parts * parts) as f64;
     (wanted > 0.0).then(|| (covered / wanted).clamp(0.0, 1.0))
 }
 

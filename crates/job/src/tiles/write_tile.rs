@@ -30,8 +30,7 @@ pub(crate) struct TileStats {
     /// Those of them that cross a border between tiles.
     pub seam_triangles: u64,
     /// Twice the area of the triangles in the plane, in square lattice steps.
-    #[serde(default)]
-    pub double_area: f64,
+    pub double_area: u64,
     /// Triangles that are left out.
     pub cut_triangles: u64,
     /// Those of them that are slivers along the hull.

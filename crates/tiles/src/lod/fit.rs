@@ -1,7 +1,6 @@
 //! The heights of a simplified terrain: those with which it is nearest to the terrain around, instead of those of single points.
 
 use crate::lod::filling::Filling;
-use crate::lod::refine::Places;
 use crate::lod::terrain::Terrain;
 use crate::lod::vertex_cells::plane;
 use delaunay::geometry::predicates::orient2d;
@@ -21,26 +20,25 @@ pub(crate) fn areas(terrain: &Terrain) -> Vec<f64> {
     areas
 }
 
-/// Moves the heights of `filling` that are not `fixed` towards the least squares of the vertical distances to the vertices of a terrain. Each
-/// has the weight of its share of the ground, `areas`: vertices of a level are dense where much stands out, so without weights
-/// each level of a wood would be higher than the one before. Returns the mean of the distances in steps of z, as they are
-/// before the heights move the last time.
+/// Moves the heights of `filling` that are not `fixed` towards the least squares of the vertical distances to the vertices of a terrain at
+/// `positions`, as far as triangles around them are `located`. Each has the weight of its share of the ground, one of `areas`: vertices of a
+/// level are dense where much stands out, so without weights each level of a wood would be higher than the one before. Returns the mean of
+/// the distances in steps of z, as they are before the heights move the last time.
 ///
 /// # Errors
 /// [`sys::Error::Interrupted`].
 pub(crate) fn fit(
-    positions: &[[i32; 3]],
+    (positions, areas): (&[[i32; 3]], &[f64]),
     fixed: impl Fn(u32) -> bool,
     filling: &mut Filling,
-    places: &mut Places,
-    areas: &[f64],
+    located: &[u32],
 ) -> Result<f64> {
-    let located = places.locate_all(filling);
+    let moves: Vec<bool> = filling.vertices.iter().map(|&v| !fixed(v)).collect();
+    let samples = samples((positions, areas), &moves, filling, located);
     let mut error = 0.0;
     let mut heights: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
-    let moves: Vec<bool> = filling.vertices.iter().map(|&v| !fixed(v)).collect();
     for _ in 0..ROUNDS {
-        error = improve(positions, &moves, filling, located, areas, &mut heights)?;
+        error = improve(&samples, &moves, &mut heights)?;
     }
     let rounded = rounded(positions, &heights);
     filling.positions.iter_mut().zip(rounded).for_each(|(p, height)| p[2] = height);
@@ -54,34 +52,51 @@ fn rounded(positions: &[[i32; 3]], heights: &[f64]) -> impl Iterator<Item = i32>
     heights.iter().map(move |height| (height.round() as i32).clamp(low, high))
 }
 
-/// Moves those `heights` of `filling` once that may move. `located` has the triangle around each of `positions`, and `areas` its weight.
-/// Returns the mean of the distances before, in the triangles with a height that may move.
-///
-/// # Errors
-/// [`sys::Error::Interrupted`].
-pub(crate) fn improve(
-    positions: &[[i32; 3]],
+/// A vertex of a terrain in a triangle of a filling.
+pub(crate) struct Sample {
+    /// The corners of the triangle.
+    sites: [u32; 3],
+    /// Its barycentric coordinates.
+    weights: [f64; 3],
+    /// In steps of z.
+    height: i32,
+    /// Its share of the ground.
+    area: f64,
+}
+
+/// Returns the vertices at `positions` with these `areas` that lie in triangles of `filling` with a corner that moves. `located` has the triangle
+/// around each.
+pub(crate) fn samples(
+    (positions, areas): (&[[i32; 3]], &[f64]),
     moves: &[bool],
     filling: &Filling,
     located: &[u32],
-    areas: &[f64],
-    heights: &mut [f64],
-) -> Result<f64> {
+) -> Vec<Sample> {
+    let sample = |((&triangle, &p), &area): ((&u32, &[i32; 3]), &f64)| {
+        let sites = filling.corners(triangle as usize);
+        let place = |site: u32| plane(filling.positions[site as usize]);
+        let is_used = sites.iter().any(|&site| moves[site as usize]);
+        is_used.then(|| Sample { sites, weights: weights(sites.map(place), plane(p)), height: p[2], area })
+    };
+    let mut samples = Vec::with_capacity(located.len());
+    samples.extend(located.iter().zip(positions).zip(areas).filter_map(sample));
+    samples
+}
+
+/// Moves those of `heights` once that may move. Returns the mean distance of the samples before.
+///
+/// # Errors
+/// [`sys::Error::Interrupted`].
+pub(crate) fn improve(samples: &[Sample], moves: &[bool], heights: &mut [f64]) -> Result<f64> {
     interrupt::check()?;
     // For every vertex the sum of the weights, and that of the distances times their weights.
     let mut sums = vec![[0.0; 2]; heights.len()];
-    let (mut total, mut count) = (0.0, 0);
-    for ((&triangle, &p), &area) in located.iter().zip(positions).zip(areas) {
-        let corners = filling.corners(triangle as usize);
-        if !corners.iter().any(|&site| moves[site as usize]) {
-            continue;
-        }
-        let weights = weights(corners.map(|site| plane(filling.positions[site as usize])), plane(p));
-        let height: f64 = corners.iter().zip(weights).map(|(&site, weight)| weight * heights[site as usize]).sum();
-        let distance = f64::from(p[2]) - height;
+    let mut total = 0.0;
+    for Sample { sites, weights, height, area } in samples {
+        let of_filling: f64 = sites.iter().zip(weights).map(|(&site, weight)| weight * heights[site as usize]).sum();
+        let distance = f64::from(*height) - of_filling;
         total += distance.abs();
-        count += 1;
-        for (&site, weight) in corners.iter().zip(weights) {
+        for (&site, weight) in sites.iter().zip(weights) {
             let [of_weights, of_distances] = &mut sums[site as usize];
             *of_weights += area * weight;
             *of_distances += area * weight * distance;
@@ -92,7 +107,7 @@ pub(crate) fn improve(
             *height += of_distances / of_weights;
         }
     }
-    Ok(total / f64::from(count.max(1)))
+    Ok(total / samples.len().max(1) as f64)
 }
 
 /// Returns how far a point is above a triangle of `filling`, in steps of z.
@@ -113,6 +128,7 @@ fn weights(corners: [[i32; 2]; 3], p: [i32; 2]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lod::refine::Places;
 
     /// Areas of the points of a [`Square`] that are all equal.
     static EQUAL: [f64; 2_500] = [1.0; 2_500];
@@ -151,7 +167,8 @@ mod tests {
         let mut places = Places::new(&square.terrain, &filling);
         let squares = |distances: Vec<f64>| distances.iter().map(|d| d * d).sum::<f64>();
         let before = squares(square.distances(&filling, &mut places));
-        let mean = fit(&square.terrain, |v| v.is_multiple_of(70), &mut filling, &mut places, &EQUAL).unwrap();
+        let located = places.locate_all(&filling);
+        let mean = fit((&square.terrain, &EQUAL), |v| v.is_multiple_of(70), &mut filling, located).unwrap();
         let after = squares(square.distances(&filling, &mut places));
         assert!(after < 0.85 * before, "{after} of {before}");
         assert!((10.0..60.0).contains(&mean), "{mean}");
@@ -166,7 +183,8 @@ mod tests {
             let square = Square::new(|x, _| sign * (1_000 * (x % 2) - 500));
             let mut filling = Filling::new(&square.terrain, &square.kept).unwrap();
             let mut places = Places::new(&square.terrain, &filling);
-            fit(&square.terrain, |_| false, &mut filling, &mut places, &EQUAL).unwrap();
+            let located = places.locate_all(&filling);
+            fit((&square.terrain, &EQUAL), |_| false, &mut filling, located).unwrap();
             let distances = square.distances(&filling, &mut places);
             let mean = distances.iter().sum::<f64>() / distances.len() as f64;
             assert!(mean.abs() < 10.0, "{mean} of 500");
@@ -180,7 +198,8 @@ mod tests {
         let areas: Vec<f64> = (0..2_500).map(|i| if i % 10 == 0 { 81.0 } else { 1.0 }).collect();
         let mut filling = Filling::new(&square.terrain, &square.kept).unwrap();
         let mut places = Places::new(&square.terrain, &filling);
-        fit(&square.terrain, |_| false, &mut filling, &mut places, &areas).unwrap();
+        let located = places.locate_all(&filling);
+        fit((&square.terrain, &areas), |_| false, &mut filling, located).unwrap();
         let distances = square.distances(&filling, &mut places);
         let mean = distances.iter().zip(&areas).map(|(d, area)| d * area).sum::<f64>() / areas.iter().sum::<f64>();
         assert!(mean.abs() < 50.0, "{mean} of 1000");

@@ -103,7 +103,8 @@ struct Furthest {
 }
 
 impl Furthest {
-    /// Looks at one of `every` vertices, among them all that were looked at before, as far as it `may_choose` them.
+    /// Looks at one of `every` vertices, among them all that were looked at before, as far as it `may_choose` them. What is known of a triangle
+    /// that has not changed needs no second look.
     fn look(
         &mut self,
         positions: &[[i32; 3]],
@@ -112,24 +113,25 @@ impl Furthest {
         places: &mut Places,
         every: usize,
     ) {
-        if every != self.last_every {
-            self.has_changed.fill(true);
-        }
         self.has_changed.resize(filling.triangles(), true);
         self.of_triangles.resize(filling.triangles(), FarVertex::default());
         for (far, _) in self.of_triangles.iter_mut().zip(&self.has_changed).filter(|(_, has_changed)| **has_changed) {
             *far = FarVertex::default();
         }
         for v in (0..positions.len()).step_by(every) {
-            // Where this is not yet the triangle of the vertex, all have changed.
-            if !self.has_changed[places.triangles[v] as usize] || !may_choose(v) {
+            // Those that were looked at before know their triangle, unless that has changed.
+            let is_known = v.is_multiple_of(self.last_every) && !self.has_changed[places.triangles[v] as usize];
+            if is_known || !may_choose(v) {
                 continue;
             }
             let Some(triangle) = places.locate(v as u32, filling) else { break };
             let corners = filling.corners(triangle);
             let distance = vertical_distance(&corners.map(|site| filling.positions[site as usize]), positions[v]);
-            if distance > self.of_triangles[triangle].distance {
-                self.of_triangles[triangle] = FarVertex { distance, vertex: v as u32 };
+            let vertex = v as u32;
+            let far = &mut self.of_triangles[triangle];
+            // Of two that are as far, the first one stays.
+            if distance > far.distance || distance == far.distance && vertex < far.vertex {
+                *far = FarVertex { distance, vertex };
             }
         }
         self.has_changed.fill(false);

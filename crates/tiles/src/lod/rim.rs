@@ -3,7 +3,7 @@
 //! is above the surface beside it, and has a skirt that reaches below: who looks across the outline sees one of the two surfaces or the skirt.
 
 use crate::lod::filling::{Border, CoarseMesh, Filling};
-use crate::lod::fit::{distance_above, improve};
+use crate::lod::fit::{distance_above, improve, samples};
 use crate::lod::outline::Outline;
 use sys::Result;
 
@@ -26,7 +26,7 @@ impl ShownMesh {
 }
 
 /// Returns the triangles of `filling` that `covers` tells of, with a border that is raised by what the `outline` of the terrain at `positions` is
-/// above them. Skirts reach below the outline by the mean error in steps of z. `areas` are the weights of [`improve`]. `may_move` tells which
+/// above them. Skirts reach below the outline by the mean error in steps of z. `areas` are those of [`samples`]. `may_move` tells which
 /// vertices of the terrain are no parts of lines.
 pub(crate) fn shown(
     (positions, areas): (&[[i32; 3]], &[f64]),
@@ -50,8 +50,9 @@ pub(crate) fn shown(
         is_on_border[site as usize] = true;
     }
     let moves = beside(filling, &is_on_border, |site| may_move(filling.vertices[site as usize]));
+    let samples = samples((positions, areas), &moves, filling, places);
     for _ in 0..ROUNDS {
-        improve(positions, &moves, filling, places, areas, &mut fitted)?;
+        improve(&samples, &moves, &mut fitted)?;
     }
     for (site, (&height, &before)) in fitted.iter().zip(&before).enumerate() {
         if let Some(position) = mesh.positions.get_mut(number[site] as usize) {

@@ -97,16 +97,16 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     let mut fixed = vec![false; positions.len()];
     kept_lines.vertices.iter().for_each(|&v| fixed[v] = true);
     let areas = areas(terrain);
-    let typical_error = fit(positions, |v| fixed[v as usize], &mut filling, &mut places, &areas)?;
+    let located = places.locate_all(&filling);
+    let typical_error = fit((positions, &areas), |v| fixed[v as usize], &mut filling, located)?;
     interrupt::check()?;
-    let (shown, covers) = match places.locate_all(&filling) {
-        places if places.len() == positions.len() => {
-            let covers = covering(positions, &outline, &filling, places);
-            let may_move = |v: u32| !fixed[v as usize];
-            (Some(shown((positions, &areas), &outline, &filling, &covers, places, may_move, typical_error)?), covers)
-        }
+    let (shown, covers) = if located.len() == positions.len() {
+        let covers = covering(positions, &outline, &filling, located);
+        let may_move = |v: u32| !fixed[v as usize];
+        (Some(shown((positions, &areas), &outline, &filling, &covers, located, may_move, typical_error)?), covers)
+    } else {
         // Nearly all triangles are slivers.
-        _ => (None, Vec::new()),
+        (None, Vec::new())
     };
     let (working, is_new) = with_outline(positions, kept, &outline, filling, &mut places)?;
     let shown = shown.unwrap_or_else(|| ShownMesh::without_skirts(working.clone()));

@@ -9,8 +9,8 @@ use crate::publish::terrain_tiles::check::{check_places, globe_of};
 use crate::publish::terrain_tiles::globe_grid::{GlobeGrid, Place};
 use crate::publish::terrain_tiles::waiting::WaitingRecords;
 use crate::publish::terrain_tiles::zooms::{Surroundings, WaitingPiece, Zoom};
+use crate::tiles::write_tile::TileStats;
 use delaunay::geometry::Bounds;
-use delaunay::geometry::predicates::orient2d;
 use quantized_mesh::{HEIGHT_STEPS, LayerAbout, Tile, ZoomTiles, cut, finest_zoom, layer};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use sys::{Error, Result, interrupt};
 use tiles::frame::Frame;
-use tiles::raster::window::LatticeMesh;
 use tiles::tiles3d::globe::Globe;
 
 /// What came of terrain tiles.
@@ -53,6 +52,8 @@ pub(crate) struct TerrainWork<'a> {
     plan: &'a Plan,
     frame: &'a Frame,
     tiles: Vec<TileBox>,
+    /// Figures of all tiles together.
+    stats: &'a TileStats,
     globe: Globe,
 }
 
@@ -78,53 +79,26 @@ impl ZoomSteps<'_> {
     }
 }
 
-/// What the tiles of a job have in common.
-#[derive(Clone, Copy, Debug, Default)]
-struct Measured {
-    /// Twice the area in square lattice steps.
-    double_area: u64,
-    triangles: u64,
-    bounds: Option<Bounds<2>>,
-}
-
-impl Measured {
-    fn of(mesh: &LatticeMesh) -> Measured {
-        let site = |v: u32| {
-            let [x, y, _] = mesh.positions[v as usize];
-            [x, y]
-        };
-        let areas = mesh.triangles.iter().map(|&[a, b, c]| orient2d(site(a), site(b), site(c)).unsigned_abs());
-        Measured {
-            double_area: areas.sum(),
-            triangles: mesh.triangles.len() as u64,
-            bounds: Bounds::of_points(mesh.triangles.iter().flatten().map(|&v| site(v))),
-        }
-    }
-
-    fn join(self, other: Measured) -> Measured {
-        Measured {
-            double_area: self.double_area + other.double_area,
-            triangles: self.triangles + other.triangles,
-            bounds: self.bounds.into_iter().chain(other.bounds).reduce(Bounds::union),
-        }
-    }
-}
-
 impl<'a> TerrainWork<'a> {
     /// Looks at what is to be done for the terrain tiles of a job whose tiles have the scene of `frame`; `None` if the user wants none.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Broken`] on a store, [`Error::Config`] if the terrain has no place on the globe.
-    pub(crate) fn of(plan: &'a Plan, frame: &'a Frame, tiles: &dyn EachTile) -> Result<Option<TerrainWork<'a>>> {
+    pub(crate) fn of(
+        plan: &'a Plan,
+        frame: &'a Frame,
+        tiles: &dyn EachTile,
+        stats: &'a TileStats,
+    ) -> Result<Option<TerrainWork<'a>>> {
         if plan.options.output.terrain.is_none() {
             return Ok(None);
         }
-        Ok(Some(TerrainWork { plan, frame, tiles: boxes(tiles)?, globe: globe_of(plan)? }))
+        Ok(Some(TerrainWork { plan, frame, tiles: boxes(tiles)?, stats, globe: globe_of(plan)? }))
     }
 
-    /// Returns the number of steps. For each tile there is one to measure it, one to cut it, and what the zooms take together is divided into others.
+    /// Returns the number of steps. For each tile there is one to cut it, and what the zooms take together is divided into others.
     pub(crate) fn steps(&self) -> u64 {
-        (2 + STEPS_OF_ZOOMS) * self.tiles.len() as u64
+        (1 + STEPS_OF_ZOOMS) * self.tiles.len() as u64
     }
 
     /// Writes the tiles from those of the job, which must have their names. Calls `done` for each of the [steps](TerrainWork::steps).
@@ -136,16 +110,16 @@ impl<'a> TerrainWork<'a> {
         directory: &JobDirectory,
         done: &(dyn Fn(u64) + Sync),
     ) -> Result<(TerrainStats, Vec<PendingFile>)> {
-        let measured = self.measure(directory, done)?;
-        let bounds = measured.bounds.ok_or_else(|| Error::Broken("there is no triangle for terrain tiles".into()))?;
+        let bounds = self.tiles.iter().map(|tile| tile.bounds).reduce(Bounds::union);
+        let bounds = bounds.ok_or_else(|| Error::Broken("there is no triangle for terrain tiles".into()))?;
         check_places(self.plan, &self.globe, bounds)?;
         let middle = bounds.middle();
         let place = Place::of(self.plan, &self.globe, middle).map_err(Error::Config)?;
         let grid = |zoom: u8| GlobeGrid::new(self.plan, &self.globe, zoom, place.longitude);
         // Any zoom tells the area of a step.
         let area_of_step = grid(quantized_mesh::MOST_ZOOM).area_of_step(middle)?;
-        let area = measured.double_area as f64 / 2.0 * area_of_step.abs();
-        let zoom = finest_zoom(area, measured.triangles / 2, place.latitude);
+        let area = self.stats.double_area as f64 / 2.0 * area_of_step.abs();
+        let zoom = finest_zoom(area, self.stats.triangles / 2, place.latitude);
         let (pieces, list) = self.cut(directory, &grid(zoom), area_of_step < 0.0, done)?;
         // Each tile is joined or selected, and written. The coarser zooms have a third as many as the finest.
         let finest_tiles = list.iter().map(|(tile, _)| tile).collect::<HashSet<_>>().len() as u64;
@@ -170,17 +144,6 @@ impl<'a> TerrainWork<'a> {
         pyramid.write(finest, finish_tile)?;
         let about = LayerAbout { bounds: degrees, attribution: self.plan.options.output.copyright() };
         pyramid.finish(&about)
-    }
-
-    fn measure(&self, directory: &JobDirectory, done: &(dyn Fn(u64) + Sync)) -> Result<Measured> {
-        let measure = |tile: &TileBox| {
-            interrupt::check()?;
-            let measured = Measured::of(&lattice_mesh(&directory.output().tile(tile.tile.number()), self.frame)?);
-            done(1);
-            Ok(measured)
-        };
-        let measured = self.tiles.par_iter().with_max_len(1).map(measure);
-        measured.try_reduce(Measured::default, |a, b| Ok(a.join(b)))
     }
 
     /// Cuts all tiles along those of a zoom.

@@ -231,7 +231,7 @@ fn publish(
         exports = run.write(JobStep::Exports, stage, write)?;
     }
     warnings.extend(exports.warnings);
-    if let Some(work) = TerrainWork::of(plan, &style.frame, tiles)? {
+    if let Some(work) = TerrainWork::of(plan, &style.frame, tiles, &written.stats)? {
         let stage = ("terrain", work.steps(), "tiles");
         let write = |stage: &Stage| work.write(directory, &|steps| stage.advance(steps));
         terrain = Some(run.write(JobStep::Terrain, stage, write)?);
