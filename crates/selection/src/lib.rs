@@ -15,6 +15,7 @@ mod error_bound;
 mod hull;
 mod regions;
 mod rounds;
+mod sample;
 mod seeds;
 mod select;
 mod selected_sites;
