@@ -18,7 +18,7 @@ const NONE: u32 = u32::MAX;
 const SELECTED: u32 = u32::MAX - 1;
 
 /// If more than one selected point for so many is new, all are triangulated anew.
-const SITES_PER_INSERTED: usize = 4;
+const SITES_PER_INSERTED: usize = 5;
 
 /// The points of a block, and a triangulation in which every triangle that holds one of them is a triangle of all that is selected, in this
 /// block or elsewhere.
@@ -297,18 +297,18 @@ impl BlockErrors {
 }
 
 impl Block {
-    /// Returns the block of `points`, which lie in `bounds`, and what `selected` has near them. `outline` has the corners of the hull of the
-    /// whole cloud. `triangulate` returns the canonical triangulation of sites.
+    /// Returns the block of `points`, which lie in `bounds`, and what `selected` has near them. `afar` are others that are selected, among them the
+    /// corners of the hull of the whole cloud that are not near. `triangulate` returns the canonical triangulation of sites.
     pub(crate) fn new<E>(
         PointsByPlace(points): PointsByPlace,
         bounds: Bounds<2>,
         sample: Sample,
         selected: &SelectedSites,
-        outline: &[[i32; 3]],
+        afar: &[[i32; 3]],
         triangulate: impl FnOnce(&[Site]) -> Result<HalfEdgeMesh, E>,
     ) -> Result<Block, E> {
         let around = surroundings(bounds, selected);
-        let mut known = outline.to_vec();
+        let mut known = afar.to_vec();
         selected.within(around).for_each(|point| known.push(point));
         let key = |value: i32| u64::from(value.cast_unsigned() ^ 1 << 31);
         radsort::sort_by_key(&mut known, |&[x, y, _]| key(y) << 32 | key(x));
@@ -358,11 +358,14 @@ impl Block {
         selected.newly_near(self.around) > self.mesh.sites.len() / SITES_PER_INSERTED
     }
 
-    /// Returns the points that are not known to be selected.
-    pub(crate) fn into_points(self) -> PointsByPlace {
-        let points = self.points.into_iter().zip(self.next);
+    /// Returns the points that are not known to be selected, and the sites of the mesh that are not near them.
+    pub(crate) fn into_points(self) -> (PointsByPlace, Vec<[i32; 3]>) {
+        let sites = self.mesh.sites.iter().zip(&self.mesh.heights).map(|(&[x, y], &z)| [x, y, z]);
+        let afar = sites.filter(|site| !is_in(&self.around, site)).collect();
         recycle(self.mesh.mesh);
-        PointsByPlace(points.filter(|(_, next)| *next != SELECTED).map(|(point, _)| point).collect())
+        let points = self.points.into_iter().zip(self.next);
+        let points = points.filter(|(_, next)| *next != SELECTED).map(|(point, _)| point).collect();
+        (PointsByPlace(points), afar)
     }
 
     /// Inserts what has been added last to what is `selected`, as far as it concerns the block.

@@ -187,18 +187,24 @@ impl<'a, E: Send> Rounds<'a, E> {
         work: impl FnOnce(&mut Block) -> T,
     ) -> Result<T, E> {
         let Some(bounds) = state.bounds else { return Ok(T::default()) };
-        let triangulated = |points| {
+        let triangulated = |points, afar: &[[i32; 3]]| {
             let triangulate = |sites: &[Site]| self.source.triangulate(sites);
-            Block::new(points, bounds, self.sample, &self.selected, &self.outline, triangulate)
+            Block::new(points, bounds, self.sample, &self.selected, afar, triangulate)
         };
         let mut block = match state.block.take() {
-            Some(block) if block.grows_by_far(&self.selected) => triangulated(block.into_points())?,
+            Some(block) if block.grows_by_far(&self.selected) => {
+                let (points, afar) = block.into_points();
+                triangulated(points, &afar)?
+            }
             Some(mut block) => {
                 block.update(&self.selected);
                 block.look_at(self.sample, &self.selected);
                 block
             }
-            None => triangulated(PointsByPlace::of(&state.take_points(self.source, index)?, bounds))?,
+            None => {
+                let points = state.take_points(self.source, index)?;
+                triangulated(PointsByPlace::of(&points, bounds), &self.outline)?
+            }
         };
         let done = work(&mut block);
         state.block = Some(block).filter(|_| self.source.keeps_blocks(self.figures.points, self.selected.count()));

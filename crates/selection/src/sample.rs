@@ -4,7 +4,8 @@ use crate::error_bound::ErrorBound;
 
 /// Some of the points of a cloud: one of so many, chosen by a hash of the place.
 ///
-/// Rounds go over a small sample first, and over greater ones from what that has selected on: a point has to be looked at in a few rounds only.
+/// Rounds go over a small sample first. What that has selected is where the rounds over a greater one begin, so that most points are looked at in
+/// few rounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Sample {
     /// It has one of two to the power of so many points.
@@ -55,8 +56,30 @@ pub(crate) fn bound_of_samples(bound: ErrorBound) -> ErrorBound {
     bound.times(4)
 }
 
-/// Returns the distance above which all points of a sample are selected at once: the ones of the sample before it, a quarter of them, were within
-/// [`bound_of_samples`], so that the ground is too rough for a choice to matter.
+/// Returns the distance above which all points of a sample are selected at once. A quarter of the sample is within [`bound_of_samples`] of the
+/// mesh by then, so where another point is so far away, the ground is rough, and nearly all points are needed.
 pub(crate) fn very_far_above(bound: ErrorBound) -> ErrorBound {
     bound.times(16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_is_a_part_of_the_next_wherever_the_lattice_begins() {
+        let points: Vec<[i32; 3]> = (0..40_000).map(|i| [i % 200 * 50, i / 200 * 50, 0]).collect();
+        let of = |sample: Sample, moved: i32| -> Vec<usize> {
+            (0..points.len()).filter(|&i| sample.has([points[i][0] - moved, points[i][1], 0])).collect()
+        };
+        let samples: Vec<Vec<usize>> = Sample::ladder([0; 2]).map(|sample| of(sample, 0)).collect();
+        let share = |sample: &Vec<usize>| sample.len() as f64 / points.len() as f64;
+        for (pair, wanted) in samples.windows(2).zip([1.0 / 16.0, 1.0 / 4.0]) {
+            assert!(pair[0].iter().all(|i| pair[1].binary_search(i).is_ok()));
+            assert!((share(&pair[0]) / wanted - 1.0).abs() < 0.1, "{}", share(&pair[0]));
+        }
+        assert_eq!(samples.last().map(Vec::len), Some(points.len()));
+        let moved: Vec<Vec<usize>> = Sample::ladder([777, 0]).map(|sample| of(sample, 777)).collect();
+        assert_eq!(moved, samples);
+    }
 }

@@ -136,8 +136,8 @@ impl SelectedSites {
         let mut deepest: Option<(f64, [i32; 3])> = None;
         self.cells_of(disc).for_each(|cell| {
             for &point in &cell.points {
-                let (site, from_centre) = ([point[0], point[1]], disc.distance_from_centre(point));
-                if from_centre <= disc.reach
+                let (site, from_centre) = ([point[0], point[1]], disc.squared_distance_from_centre(point));
+                if from_centre <= disc.reach * disc.reach
                     && deepest.is_none_or(|(least, _)| from_centre < least)
                     && !corners.contains(&site)
                     && in_circle(a, b, c, site)
@@ -229,9 +229,9 @@ impl Disc {
         self.centre[axis] + self.reach
     }
 
-    fn distance_from_centre(&self, point: [i32; 3]) -> f64 {
+    fn squared_distance_from_centre(&self, point: [i32; 3]) -> f64 {
         let [x, y] = [0, 1].map(|axis| f64::from(point[axis]) - self.centre[axis]);
-        (x * x + y * y).sqrt()
+        x * x + y * y
     }
 
     /// Returns the range of x where the disc meets the stripe of these y.
