@@ -1,6 +1,7 @@
 //! The triangulation of what is selected, as far as it concerns the points of one block.
 
 use crate::error_bound::{Candidate, ErrorBound, VerticalError};
+use crate::sample::Sample;
 use crate::selected_sites::{Disc, SelectedSites};
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::square_grid::SquareGrid;
@@ -8,18 +9,26 @@ use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::mesh::index::{HalfEdgeIndex, SiteIndex};
 use delaunay::mesh::insert::{insert, locate};
+use delaunay::triangulation::canonical::recycle;
 use std::cmp::Reverse;
 
 /// Stands for no point and for no triangle.
 const NONE: u32 = u32::MAX;
+/// Stands in the place of a next point where the point is selected.
+const SELECTED: u32 = u32::MAX - 1;
+
+/// If more than one selected point for so many is new, all are triangulated anew.
+const SITES_PER_INSERTED: usize = 5;
 
 /// The points of a block, and a triangulation in which every triangle that holds one of them is a triangle of all that is selected, in this
 /// block or elsewhere.
 pub(crate) struct Block {
     /// The points, neighbours in the plane one after the other.
     points: Vec<[i32; 3]>,
-    /// For each point the next that lies in the same triangle.
+    /// For each point the next that lies in the same triangle, or [`SELECTED`].
     next: Vec<u32>,
+    /// Which of them are looked at.
+    sample: Sample,
     /// The box of the points. No point of another block lies in it.
     bounds: Bounds<2>,
     /// A box around that. The mesh has all that is selected in it.
@@ -65,10 +74,12 @@ struct Held {
     excess: u64,
     /// The number of the list that the triangle was last put on.
     listed: u32,
+    /// It lies in the block, so that it holds no points of others.
+    is_inside: bool,
 }
 
 impl Held {
-    const NOTHING: Held = Held { first: NONE, worst: NONE, numerator: [0; 2], excess: 0, listed: 0 };
+    const NOTHING: Held = Held { first: NONE, worst: NONE, numerator: [0; 2], excess: 0, listed: 0, is_inside: false };
 
     #[inline(always)]
     fn numerator(&self) -> u128 {
@@ -83,11 +94,16 @@ impl Held {
 }
 
 impl MeshOfPoints {
-    /// Returns those of the triangles that have changed, from the `first` of them on, and those beside them, each once, and `more`.
+    /// Returns those of the triangles that have changed, from the `first` of them on, and those beside them, each once, and `more`. If as many have
+    /// changed as there are, these are all.
     fn changed_and_beside(&mut self, first: usize, more: Vec<u32>) -> Vec<u32> {
         self.list += 1;
-        let mut triangles = Vec::with_capacity(more.len() + 2 * (self.changed.len() - first));
         let (held, list) = (&mut self.held, self.list);
+        if self.changed.len() - first >= held.len() {
+            held.iter_mut().for_each(|held| held.listed = list);
+            return (0..held.len() as u32).collect();
+        }
+        let mut triangles = Vec::with_capacity(more.len() + 2 * (self.changed.len() - first));
         let mut add = |t: usize| {
             if std::mem::replace(&mut held[t].listed, list) != list {
                 triangles.push(t as u32);
@@ -96,8 +112,7 @@ impl MeshOfPoints {
         more.into_iter().for_each(|t| add(t as usize));
         for &t in &self.changed[first..] {
             add(t as usize);
-            for h in HalfEdgeIndex::of_triangle(t as usize) {
-                let twin = self.mesh.twin(h);
+            for twin in HalfEdgeIndex::of_triangle(t as usize).map(|h| self.mesh.twin(h)) {
                 if twin != HalfEdgeIndex::HULL {
                     add(twin.triangle());
                 }
@@ -106,17 +121,21 @@ impl MeshOfPoints {
         triangles
     }
 
+    /// Tells whether a triangle is on the present list.
+    fn is_listed(&self, triangle: u32) -> bool {
+        self.held[triangle as usize].listed == self.list
+    }
+
     /// Returns the places of the corners of a triangle.
     #[inline(always)]
     fn corners(&self, triangle: usize) -> [Site; 3] {
         self.mesh.triangles[triangle].map(|v| self.sites[v.get()])
     }
 
-    /// Returns the triangles beside a triangle.
-    #[inline]
-    fn beside(&self, triangle: usize) -> impl Iterator<Item = usize> {
-        let twins = HalfEdgeIndex::of_triangle(triangle).map(|h| self.mesh.twin(h));
-        twins.into_iter().filter(|&twin| twin != HalfEdgeIndex::HULL).map(HalfEdgeIndex::triangle)
+    /// Returns the twins of the sides of a triangle.
+    #[inline(always)]
+    fn twins_of(&self, triangle: usize) -> [HalfEdgeIndex; 3] {
+        HalfEdgeIndex::of_triangle(triangle).map(|h| self.mesh.twin(h))
     }
 
     /// Returns the corners of a triangle in ascending order.
@@ -137,6 +156,12 @@ impl MeshOfPoints {
         if bound.is_exceeded_by(error) { error.fixed().max(1) } else { 0 }
     }
 
+    /// Returns the corners of a triangle.
+    fn points(&self, triangle: usize) -> [[i32; 3]; 3] {
+        let (sites, heights) = (self.corners(triangle), self.heights(triangle));
+        [0, 1, 2].map(|k| [sites[k][0], sites[k][1], heights[k]])
+    }
+
     /// Returns the heights of the corners of a triangle.
     #[inline(always)]
     fn heights(&self, triangle: usize) -> [i32; 3] {
@@ -152,7 +177,7 @@ struct NearestTriangles {
 
 impl NearestTriangles {
     /// A square has so many points, more or less.
-    const POINTS: f64 = 64.0;
+    const POINTS: f64 = 24.0;
 
     fn new(bounds: Bounds<2>, points: usize) -> NearestTriangles {
         let grid = grid_of(bounds, points, NearestTriangles::POINTS);
@@ -174,18 +199,22 @@ fn grid_of(bounds: Bounds<2>, points: usize, wanted: f64) -> SquareGrid {
     SquareGrid::new(bounds, (area * wanted / points.max(1) as f64).sqrt().ceil().max(1.0), 4096.0)
 }
 
-/// Returns the points row by row of small cells, to and fro.
-fn by_place(points: &[[i32; 3]], bounds: Bounds<2>) -> Vec<[i32; 3]> {
-    let grid = grid_of(bounds, points.len(), 4.0);
-    let columns = grid.columns();
-    let key = |(i, cell): (usize, u32)| {
-        let (row, column) = (cell as usize / columns, cell as usize % columns);
-        let column = if row.is_multiple_of(2) { column } else { columns - 1 - column };
-        ((row * columns + column) as u64) << 32 | i as u64
-    };
-    let mut keys: Vec<u64> = grid.cells_of(points).into_iter().enumerate().map(key).collect();
-    radsort::sort_by_key(&mut keys, |key| (key >> 32) as u32);
-    keys.into_iter().map(|key| points[key as u32 as usize]).collect()
+/// The points of a block row by row of small cells, to and fro.
+pub(crate) struct PointsByPlace(Vec<[i32; 3]>);
+
+impl PointsByPlace {
+    pub(crate) fn of(points: &[[i32; 3]], bounds: Bounds<2>) -> PointsByPlace {
+        let grid = grid_of(bounds, points.len(), 4.0);
+        let columns = grid.columns();
+        let key = |(i, cell): (usize, u32)| {
+            let (row, column) = (cell as usize / columns, cell as usize % columns);
+            let column = if row.is_multiple_of(2) { column } else { columns - 1 - column };
+            ((row * columns + column) as u64) << 32 | i as u64
+        };
+        let mut keys: Vec<u64> = grid.cells_of(points).into_iter().enumerate().map(key).collect();
+        radsort::sort_by_key(&mut keys, |key| (key >> 32) as u32);
+        PointsByPlace(keys.into_iter().map(|key| points[key as u32 as usize]).collect())
+    }
 }
 
 fn is_in(bounds: &Bounds<2>, point: &[i32; 3]) -> bool {
@@ -268,19 +297,21 @@ impl BlockErrors {
 }
 
 impl Block {
-    /// Returns the block of `points`, which lie in `bounds`, and what `selected` has near them. `outline` has the corners of the hull of the
-    /// whole cloud. `triangulate` returns the canonical triangulation of sites.
+    /// Returns the block of `points`, which lie in `bounds`, and what `selected` has near them. `afar` are others that are selected, among them the
+    /// corners of the hull of the whole cloud that are not near. `triangulate` returns the canonical triangulation of sites.
     pub(crate) fn new<E>(
-        points: Vec<[i32; 3]>,
+        PointsByPlace(points): PointsByPlace,
         bounds: Bounds<2>,
+        sample: Sample,
         selected: &SelectedSites,
-        outline: &[[i32; 3]],
+        afar: &[[i32; 3]],
         triangulate: impl FnOnce(&[Site]) -> Result<HalfEdgeMesh, E>,
     ) -> Result<Block, E> {
-        let points = by_place(&points, bounds);
         let around = surroundings(bounds, selected);
-        let mut known: Vec<[i32; 3]> = selected.within(around).chain(outline.iter().copied()).collect();
-        known.sort_unstable_by_key(|&[x, y, _]| (y, x));
+        let mut known = afar.to_vec();
+        selected.within(around).for_each(|point| known.push(point));
+        let key = |value: i32| u64::from(value.cast_unsigned() ^ 1 << 31);
+        radsort::sort_by_key(&mut known, |&[x, y, _]| key(y) << 32 | key(x));
         known.dedup();
         let sites: Vec<Site> = known.iter().map(|&[x, y, _]| [x, y]).collect();
         let mesh = triangulate(&sites)?;
@@ -294,12 +325,14 @@ impl Block {
             exceeding: 0,
             list: 0,
         };
-        let displaced = (0..points.len() as u32).map(|point| (point, NONE)).collect();
+        let of_sample = (0..points.len() as u32).filter(|&point| sample.has(points[point as usize]));
+        let displaced = of_sample.map(|point| (point, NONE)).collect();
         let near = NearestTriangles::new(bounds, points.len());
         let next = vec![NONE; points.len()];
         let mut block = Block {
             points,
             next,
+            sample,
             bounds,
             around,
             mesh,
@@ -320,25 +353,70 @@ impl Block {
         (self.mesh.exceeding == 0).then_some(self.reach)
     }
 
-    /// Returns the box in which newly selected points concern the block.
-    pub(crate) fn reach(&self) -> Bounds<2> {
-        self.reach
+    /// Tells whether so much has been added last to what is `selected` that it is faster to triangulate the block anew.
+    pub(crate) fn grows_by_far(&self, selected: &SelectedSites) -> bool {
+        selected.newly_near(self.around) > self.mesh.sites.len() / SITES_PER_INSERTED
     }
 
-    /// Inserts what has been selected since, as far as it concerns the block. `selected` has it already.
-    pub(crate) fn update<'a>(&mut self, newly_selected: impl Iterator<Item = &'a [i32; 3]>, selected: &SelectedSites) {
+    /// Returns the points that are not known to be selected, and the sites of the mesh that are not near them.
+    pub(crate) fn into_points(self) -> (PointsByPlace, Vec<[i32; 3]>) {
+        let sites = self.mesh.sites.iter().zip(&self.mesh.heights).map(|(&[x, y], &z)| [x, y, z]);
+        let afar = sites.filter(|site| !is_in(&self.around, site)).collect();
+        recycle(self.mesh.mesh);
+        let points = self.points.into_iter().zip(self.next);
+        let points = points.filter(|(_, next)| *next != SELECTED).map(|(point, _)| point).collect();
+        (PointsByPlace(points), afar)
+    }
+
+    /// Inserts what has been added last to what is `selected`, as far as it concerns the block.
+    pub(crate) fn update(&mut self, selected: &SelectedSites) {
         let mut concerns_border = false;
-        let reach = self.reach;
-        for point in newly_selected.filter(|point| is_in(&reach, point)) {
-            if is_in(&self.around, point) {
-                let start = self.near.of(*point);
-                self.insert(*point, start);
+        selected.newly_within(self.reach).for_each(|point| {
+            if is_in(&self.around, &point) {
+                let start = self.near.of(point);
+                self.insert(point, start);
             } else {
                 concerns_border = true;
             }
-        }
+        });
         self.place_displaced();
         self.complete(selected, concerns_border);
+    }
+
+    /// Looks at the points of a sample that holds the present one.
+    pub(crate) fn look_at(&mut self, sample: Sample, selected: &SelectedSites) {
+        if sample == self.sample {
+            return;
+        }
+        let is_new = |point: &u32| {
+            let place = self.points[*point as usize];
+            sample.has(place) && !self.sample.has(place)
+        };
+        self.displaced = (0..self.points.len() as u32).filter(is_new).map(|point| (point, NONE)).collect();
+        self.sample = sample;
+        self.mesh.changed = (0..self.mesh.held.len() as u32).collect();
+        self.place_displaced();
+        self.complete(selected, true);
+    }
+
+    /// Returns the points of triangles whose distance is more than `bound`.
+    pub(crate) fn beyond(&self, bound: ErrorBound) -> Vec<[i32; 3]> {
+        let mut beyond = Vec::new();
+        for triangle in 0..self.mesh.held.len() {
+            if self.mesh.excess_over(triangle, bound) == 0 {
+                continue;
+            }
+            let corners = self.mesh.points(triangle);
+            let mut point = self.mesh.held[triangle].first;
+            while point != NONE {
+                let place = self.points[point as usize];
+                if bound.is_exceeded_by(VerticalError::of(corners, place)) {
+                    beyond.push(place);
+                }
+                point = self.next[point as usize];
+            }
+        }
+        beyond
     }
 
     /// Proposes points to select.
@@ -347,7 +425,10 @@ impl Block {
         for index in 0..self.mesh.changed.len() {
             let t = self.mesh.changed[index] as usize;
             let excess = self.mesh.excess_over(t, bound);
-            let before = std::mem::replace(&mut self.mesh.held[t].excess, excess);
+            let is_inside = self.is_inside(t);
+            let held = &mut self.mesh.held[t];
+            held.is_inside = is_inside;
+            let before = std::mem::replace(&mut held.excess, excess);
             self.mesh.exceeding = self.mesh.exceeding + usize::from(excess > 0) - usize::from(before > 0);
         }
         // Whatever was outdone by a triangle that has not changed still is.
@@ -366,11 +447,15 @@ impl Block {
     /// Adds the worst point of a triangle to the proposal, if nothing that the block knows outdoes it. Tells whether other blocks may know more.
     fn propose_of(&self, t: usize, far: u64, proposal: &mut Proposal) -> bool {
         let candidate = self.candidate(t);
-        let triangle = (!self.is_inside(t)).then(|| self.mesh.key(t));
+        let triangle = (!self.mesh.held[t].is_inside).then(|| self.mesh.key(t));
         let mut beside = [None; 3];
         let mut is_outdone = false;
-        for (k, other) in self.mesh.beside(t).enumerate() {
-            match self.is_inside(other) {
+        for (k, twin) in self.mesh.twins_of(t).into_iter().enumerate() {
+            if twin == HalfEdgeIndex::HULL {
+                continue;
+            }
+            let other = twin.triangle();
+            match self.mesh.held[other].is_inside {
                 true => {
                     is_outdone |=
                         self.mesh.held[other].excess > 0 && !candidate.stands_beside(&self.candidate(other), far)
@@ -411,8 +496,7 @@ impl Block {
             if point == NONE {
                 continue;
             }
-            let (sites, heights) = (self.mesh.corners(triangle), self.mesh.heights(triangle));
-            let corners = [0, 1, 2].map(|k| [sites[k][0], sites[k][1], heights[k]]);
+            let corners = self.mesh.points(triangle);
             let mut count = 0;
             while point != NONE {
                 let place = self.points[point as usize];
@@ -422,7 +506,7 @@ impl Block {
                 point = self.next[point as usize];
                 count += 1;
             }
-            if asks_about(sites) {
+            if asks_about(self.mesh.corners(triangle)) {
                 errors.holding.push((self.mesh.key(triangle), count));
             }
         }
@@ -472,9 +556,12 @@ impl Block {
     fn place_displaced(&mut self) {
         let mut displaced = std::mem::take(&mut self.displaced);
         let mut last = 0;
-        for &(point, start) in &displaced {
-            let start = if start == NONE { last } else { start };
-            last = self.place(point, start);
+        for (number, &(point, start)) in displaced.iter().enumerate() {
+            let is_first = start == NONE;
+            last = self.place(point, if is_first { last } else { start });
+            if is_first && number % 8 == 0 {
+                self.near.set(self.points[point as usize], last);
+            }
         }
         displaced.clear();
         self.displaced = displaced;
@@ -514,6 +601,7 @@ impl Block {
                 continue;
             }
             if corners.contains(&p) {
+                self.next[point as usize] = SELECTED;
                 return triangle as u32;
             }
             let numerator = VerticalError::of_parts(parts, mesh.heights(triangle), z).numerator;
@@ -531,16 +619,25 @@ impl Block {
         }
     }
 
-    /// Inserts selected points of other blocks until no triangle that holds points, or is beside one that does, has one in its circle. Without
-    /// `looks_at_border`, those that did not change are known to have none.
-    fn complete(&mut self, selected: &SelectedSites, looks_at_border: bool) {
-        let known = if looks_at_border { std::mem::take(&mut self.at_border) } else { Vec::new() };
-        let mut unsure = self.mesh.changed_and_beside(0, known);
-        while let Some(triangle) = unsure.pop() {
-            if !self.concerns(triangle as usize) {
+    /// Inserts selected points of other blocks until no triangle that holds points, or is beside one that does, has one in its circle. Those
+    /// that did not change had none before the last points were selected, and unless these `concern_border` still have none.
+    fn complete(&mut self, selected: &SelectedSites, concern_border: bool) {
+        let mut unsure = self.mesh.changed_and_beside(0, Vec::new());
+        for triangle in std::mem::take(&mut self.at_border) {
+            if self.mesh.is_listed(triangle) {
                 continue;
             }
             let corners = self.mesh.corners(triangle as usize);
+            match concern_border && selected.has_newly_inside(corners, Disc::of(corners)) {
+                true => unsure.push(triangle),
+                false => self.at_border.push(triangle),
+            }
+        }
+        while let Some(triangle) = unsure.pop() {
+            let corners = self.mesh.corners(triangle as usize);
+            if Disc::is_surely_in(corners, &self.around) || !self.concerns(triangle as usize) {
+                continue;
+            }
             let disc = Disc::of(corners);
             if disc.is_in(&self.around) {
                 continue;
@@ -563,7 +660,8 @@ impl Block {
     /// Tells whether a triangle or one beside it holds points.
     fn concerns(&self, triangle: usize) -> bool {
         let holds_points = |t: usize| self.mesh.held[t].first != NONE;
-        holds_points(triangle) || self.mesh.beside(triangle).any(holds_points)
+        let holds_points_beyond = |twin: HalfEdgeIndex| twin != HalfEdgeIndex::HULL && holds_points(twin.triangle());
+        holds_points(triangle) || self.mesh.twins_of(triangle).iter().any(|&twin| holds_points_beyond(twin))
     }
 }
 

@@ -22,6 +22,11 @@ impl ErrorBound {
         ErrorBound { steps: steps.min(ErrorBound::MOST.saturating_mul(u64::from(per))), per }
     }
 
+    /// Returns the bound of so many times as much.
+    pub(crate) fn times(self, factor: u64) -> ErrorBound {
+        ErrorBound::new(self.steps.saturating_mul(factor), self.per)
+    }
+
     /// Returns the bound in units of [`VerticalError::fixed`], rounded up.
     pub(crate) fn fixed(self) -> u64 {
         (u128::from(self.steps) << VerticalError::FRACTION_BITS).div_ceil(u128::from(self.per)) as u64

@@ -2,10 +2,10 @@
 //!
 //! It is greedy insertion (Garland and Heckbert 1995, "Fast Polygonal Approximation of Terrains and Height Fields") in rounds. A round
 //! triangulates what is selected, and selects the worst points of the triangles where they exceed the bound, but for those that a worse one beside
-//! them may make superfluous (`rounds.rs`).
+//! them may make superfluous (`rounds.rs`). Rounds go over samples of the cloud first (`sample.rs`).
 //!
 //! The canonical triangulation of a set of sites is unique, a round looks at nothing but a triangle and the points in it, and all of its points
-//! join at once. So the selection depends on the points and the bound alone, not on how the points are divided into blocks, on
+//! join at once. Which points are in a sample goes by their places. So the selection depends on the points and the bound alone, not on how the points are divided into blocks, on
 //! threads or on the machine. All decisions are exact, in integers.
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
@@ -15,6 +15,7 @@ mod error_bound;
 mod hull;
 mod regions;
 mod rounds;
+mod sample;
 mod seeds;
 mod select;
 mod selected_sites;

@@ -36,46 +36,37 @@ pub(crate) struct Division<'a, E> {
     pub(crate) regions: Vec<Region<'a, E>>,
 }
 
-/// What a block has in a region.
-#[derive(Clone, Copy)]
-struct Share {
-    points: u64,
-    bounds: Bounds<2>,
-}
-
-/// Divides a cloud, which has `points` points in `bounds`.
+/// Divides a cloud, which has `points` points in `bounds`. Points of its blocks that are in memory do not stay there.
 ///
 /// # Errors
 /// Those of `source`.
 pub(crate) fn divide<E: Send>(
     source: &dyn PointSource<Error = E>,
+    blocks: Vec<BlockState>,
     bounds: Bounds<2>,
     points: u64,
     sizes: RegionSizes,
 ) -> Result<Division<'_, E>, E> {
     let cells = LatticeCells::new(bounds, points, sizes.points, source.offset());
-    let share = |block| {
-        let points = source.load(block)?.points;
-        let mut shares = BTreeMap::<[i32; 2], Share>::new();
-        for &[x, y, _] in &points {
-            let share = shares.entry(cells.of(x, y)).or_insert(Share { points: 0, bounds: Bounds::of_point([x, y]) });
-            share.points += 1;
-            share.bounds.include([x, y]);
+    let share = |(number, mut state): (usize, BlockState)| {
+        let mut shares = BTreeMap::<[i32; 2], Bounds<2>>::new();
+        for [x, y, _] in state.take_points(source, number)? {
+            shares.entry(cells.of(x, y)).or_insert(Bounds::of_point([x, y])).include([x, y]);
         }
-        Ok((BlockState::of(&points), shares))
+        Ok((state, shares))
     };
-    let found = (0..source.blocks()).into_par_iter().with_max_len(1).map(share).collect::<Result<Vec<_>, E>>()?;
-    let mut regions = BTreeMap::<[i32; 2], (Share, Vec<usize>)>::new();
+    let found = blocks.into_par_iter().enumerate().with_max_len(1).map(share).collect::<Result<Vec<_>, E>>()?;
+    let mut regions = BTreeMap::<[i32; 2], (Bounds<2>, Vec<usize>)>::new();
     let mut blocks = Vec::with_capacity(found.len());
     for (block, (state, shares)) in found.into_iter().enumerate() {
         blocks.push(state);
         for (cell, share) in shares {
-            let (sum, of_region) = regions.entry(cell).or_insert((Share { points: 0, ..share }, Vec::new()));
-            *sum = Share { points: sum.points + share.points, bounds: sum.bounds.union(share.bounds) };
+            let (bounds, of_region) = regions.entry(cell).or_insert((share, Vec::new()));
+            *bounds = bounds.union(share);
             of_region.push(block);
         }
     }
-    let region = |(cell, (Share { points, bounds }, blocks))| Region { source, cells, cell, blocks, points, bounds };
+    let region = |(cell, (bounds, blocks))| Region { source, cells, cell, blocks, bounds };
     Ok(Division { blocks, regions: regions.into_iter().map(region).collect() })
 }
 
@@ -86,9 +77,7 @@ pub(crate) struct Region<'a, E> {
     cell: [i32; 2],
     /// The blocks that have some.
     blocks: Vec<usize>,
-    /// How many there are.
-    pub(crate) points: u64,
-    /// The box of them.
+    /// The box of its points.
     pub(crate) bounds: Bounds<2>,
 }
 

@@ -4,10 +4,11 @@
 //! until the circle of no triangle that holds its points has one ([`crate::block`]). So these triangles are those of the whole triangulation.
 //! A triangle that reaches out of a block may hold points of others: their worst points are compared.
 
-use crate::block::{Block, BlockErrors, Proposal, SharedCandidate, TriangleKey, Undecided, far_above};
+use crate::block::{Block, BlockErrors, PointsByPlace, Proposal, SharedCandidate, TriangleKey, Undecided, far_above};
 use crate::error_bound::{Candidate, ErrorBound};
+use crate::sample::{Sample, bound_of_samples, very_far_above};
 use crate::selected_sites::SelectedSites;
-use crate::source::PointSource;
+use crate::source::{BlockPoints, PointSource};
 use delaunay::geometry::{Bounds, Site};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -47,6 +48,8 @@ pub struct Selection {
 pub(crate) struct BlockState {
     pub(crate) bounds: Option<Bounds<2>>,
     pub(crate) points: u64,
+    /// Its points, if they stay in memory until it is triangulated.
+    pub(crate) loaded: Option<BlockPoints>,
     block: Option<Block>,
     /// If the block has nothing to propose: where points must be selected before that changes.
     settled: Option<Bounds<2>>,
@@ -58,6 +61,19 @@ impl BlockState {
         let bounds = Bounds::of_points(points.iter().map(|p| [p[0], p[1]]));
         BlockState { bounds, points: points.len() as u64, ..BlockState::default() }
     }
+
+    /// Takes the points of the block with this number, from memory if they are there.
+    ///
+    /// # Errors
+    /// Those of the source.
+    pub(crate) fn take_points<E: Send>(
+        &mut self,
+        source: &dyn PointSource<Error = E>,
+        index: usize,
+    ) -> Result<Vec<[i32; 3]>, E> {
+        let loaded = self.loaded.take();
+        Ok(loaded.map_or_else(|| source.load(index), Ok)?.points)
+    }
 }
 
 /// A selection under way.
@@ -67,8 +83,8 @@ pub(crate) struct Rounds<'a, E> {
     outline: Vec<[i32; 3]>,
     blocks: Vec<Mutex<BlockState>>,
     selected: SelectedSites,
-    /// What the last round selected, by the cells of `selected`.
-    newly_selected: Vec<[i32; 3]>,
+    /// The points that are looked at.
+    sample: Sample,
     figures: Figures,
 }
 
@@ -80,7 +96,7 @@ impl<'a, E: Send> Rounds<'a, E> {
             outline: Vec::new(),
             blocks: Vec::new(),
             selected: SelectedSites::none(bounds, points),
-            newly_selected: Vec::new(),
+            sample: Sample::all(source.offset()),
             figures: Figures::default(),
         }
     }
@@ -91,57 +107,68 @@ impl<'a, E: Send> Rounds<'a, E> {
         self.figures.rounds = rounds;
         self.blocks = blocks.into_iter().map(Mutex::new).collect();
         self.outline = outline;
-        self.add(first);
+        self.selected.add(first);
     }
 
-    /// Does all rounds, and returns what they select. Of points on one line that is all of them.
+    /// Does all rounds, over these samples one after the other, and returns what they select. Of points on one line that is all of them.
     ///
     /// # Errors
     /// Those of the source.
-    pub(crate) fn run(mut self, bound: ErrorBound) -> Result<Selection, E> {
+    pub(crate) fn run(mut self, bound: ErrorBound, samples: impl Iterator<Item = Sample>) -> Result<Selection, E> {
         if self.outline.len() < 3 {
             return self.select_all();
         }
-        self.down_to(bound)?;
+        for (number, sample) in samples.enumerate() {
+            self.sample = sample;
+            for state in &mut self.blocks {
+                state.get_mut().unwrap_or_else(PoisonError::into_inner).settled = None;
+            }
+            if number > 0 {
+                self.add_beyond(very_far_above(bound))?;
+            }
+            self.down_to(if sample.is_all() { bound } else { bound_of_samples(bound) })?;
+        }
         self.finish()
     }
 
-    fn add(&mut self, mut points: Vec<[i32; 3]>) {
-        // Neighbours in the plane one after the other: what a block looks at for one is still in the cache for the next.
-        points.par_sort_unstable_by_key(|&point| (self.selected.cell_of(point), point));
-        self.selected.add(&points);
-        self.newly_selected = points;
+    /// Selects all points of the sample that exceed `bound`.
+    fn add_beyond(&mut self, bound: ErrorBound) -> Result<(), E> {
+        let beyond = (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|index| {
+            let mut state = self.blocks[index].lock().unwrap_or_else(PoisonError::into_inner);
+            self.with_block(index, &mut state, |block| block.beyond(bound))
+        });
+        let beyond = beyond.collect::<Result<Vec<_>, E>>()?;
+        self.add_round(beyond.into_iter().flatten()).map(|_| ())
     }
 
-    /// Returns the newly selected points in the cells that meet `bounds`.
-    fn newly_selected_near(&self, bounds: Bounds<2>) -> impl Iterator<Item = &[i32; 3]> {
-        let [rows, columns] = self.selected.rows_and_columns(bounds);
-        let from = move |row: usize, column: usize| {
-            self.newly_selected.partition_point(|&point| self.selected.cell_of(point) < [row, column])
-        };
-        rows.flat_map(move |row| &self.newly_selected[from(row, columns.start)..from(row, columns.end)])
-    }
-
-    /// Does rounds until no point exceeds `bound`.
+    /// Does rounds until no point of the sample exceeds `bound`.
     fn down_to(&mut self, bound: ErrorBound) -> Result<(), E> {
         loop {
             let proposals =
                 (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|block| self.proposal_of(block, bound));
-            let accepted = accept(proposals.collect::<Result<_, E>>()?, far_above(bound));
-            self.newly_selected.clear();
-            if accepted.is_empty() {
+            let proposals = proposals.collect::<Result<Vec<_>, E>>()?;
+            if !self.add_round(accepted(&proposals, far_above(bound)))? {
                 return Ok(());
             }
-            self.add(accepted);
-            self.figures.rounds += 1;
-            self.source.after_round(self.figures.rounds, self.selected.count())?;
         }
+    }
+
+    /// Selects what a round has found. Tells whether that is any point.
+    fn add_round(&mut self, found: impl Iterator<Item = [i32; 3]>) -> Result<bool, E> {
+        let before = self.selected.count();
+        self.selected.add(found);
+        if self.selected.count() == before {
+            return Ok(false);
+        }
+        self.figures.rounds += 1;
+        self.source.after_round(self.figures.rounds, self.selected.count())?;
+        Ok(true)
     }
 
     /// Returns what a block proposes to select. A block that has nothing to propose is left alone until points are selected near it.
     fn proposal_of(&self, index: usize, bound: ErrorBound) -> Result<Proposal, E> {
         let mut state = self.blocks[index].lock().unwrap_or_else(PoisonError::into_inner);
-        if state.settled.is_some_and(|reach| self.newly_selected_near(reach).next().is_none()) {
+        if state.settled.is_some_and(|reach| self.selected.newly_within(reach).next().is_none()) {
             return Ok(Proposal::default());
         }
         self.with_block(index, &mut state, |block| (block.propose(bound), block.settled_within())).map(
@@ -160,14 +187,23 @@ impl<'a, E: Send> Rounds<'a, E> {
         work: impl FnOnce(&mut Block) -> T,
     ) -> Result<T, E> {
         let Some(bounds) = state.bounds else { return Ok(T::default()) };
+        let triangulated = |points, afar: &[[i32; 3]]| {
+            let triangulate = |sites: &[Site]| self.source.triangulate(sites);
+            Block::new(points, bounds, self.sample, &self.selected, afar, triangulate)
+        };
         let mut block = match state.block.take() {
+            Some(block) if block.grows_by_far(&self.selected) => {
+                let (points, afar) = block.into_points();
+                triangulated(points, &afar)?
+            }
             Some(mut block) => {
-                block.update(self.newly_selected_near(block.reach()), &self.selected);
+                block.update(&self.selected);
+                block.look_at(self.sample, &self.selected);
                 block
             }
             None => {
-                let points = self.source.load(index)?.points;
-                Block::new(points, bounds, &self.selected, &self.outline, |sites| self.source.triangulate(sites))?
+                let points = state.take_points(self.source, index)?;
+                triangulated(PointsByPlace::of(&points, bounds), &self.outline)?
             }
         };
         let done = work(&mut block);
@@ -205,7 +241,7 @@ impl<'a, E: Send> Rounds<'a, E> {
     fn select_all(self) -> Result<Selection, E> {
         let mut selected = self.selected.emptied();
         for block in 0..self.source.blocks() {
-            selected.add(&self.source.load(block)?.points);
+            selected.add(self.source.load(block)?.points);
         }
         let figures = Figures { points: self.figures.points, selected: selected.count(), ..Figures::default() };
         Ok(Selection { sites: selected, figures, holding: Vec::new() })
@@ -213,7 +249,7 @@ impl<'a, E: Send> Rounds<'a, E> {
 }
 
 /// Returns what all blocks together select.
-fn accept(proposals: Vec<Proposal>, far: u64) -> Vec<[i32; 3]> {
+fn accepted(proposals: &[Proposal], far: u64) -> impl Iterator<Item = [i32; 3]> {
     let mut worst: HashMap<TriangleKey, Candidate> = HashMap::new();
     for SharedCandidate { triangle, candidate } in proposals.iter().flat_map(|proposal| &proposal.shared) {
         let known = worst.entry(*triangle).or_insert(*candidate);
@@ -221,14 +257,12 @@ fn accept(proposals: Vec<Proposal>, far: u64) -> Vec<[i32; 3]> {
             *known = *candidate;
         }
     }
-    let is_selected = |Undecided { candidate, triangle, beside }: &&Undecided| {
+    let is_selected = move |Undecided { candidate, triangle, beside }: &&Undecided| {
         let is_worst = triangle.is_none_or(|triangle| worst.get(&triangle) == Some(candidate));
         let mut others = beside.iter().flatten().filter_map(|triangle| worst.get(triangle));
         is_worst && others.all(|other| candidate.stands_beside(other, far))
     };
-    let undecided = proposals.iter().flat_map(|proposal| &proposal.undecided);
-    let mut accepted: Vec<[i32; 3]> =
-        undecided.filter(is_selected).map(|undecided| undecided.candidate.point).collect();
-    accepted.extend(proposals.iter().flat_map(|proposal| &proposal.accepted));
-    accepted
+    let undecided = proposals.iter().flat_map(|proposal| &proposal.undecided).filter(is_selected);
+    let of_one_block = proposals.iter().flat_map(|proposal| &proposal.accepted).copied();
+    undecided.map(|undecided| undecided.candidate.point).chain(of_one_block)
 }

@@ -39,10 +39,10 @@ impl LatticeCells {
         1 << self.shift
     }
 
-    /// Returns the square of the distance of a point from the middle of its cell.
-    fn distance_from_middle(self, point: [i32; 3]) -> i64 {
+    /// Returns by what points of a cell are compared: the square of the distance from its middle, and the point.
+    fn rank(self, point: [i32; 3]) -> (i64, [i32; 3]) {
         let along = |axis: usize| i64::from(point[axis] + self.offset[axis]).rem_euclid(self.side()) - self.side() / 2;
-        along(0).pow(2) + along(1).pow(2)
+        (along(0).pow(2) + along(1).pow(2), point)
     }
 }
 
@@ -64,8 +64,11 @@ impl Seeds {
 
     /// Adds the points of a block, of which those that are `fixed` are seeds in any case.
     pub(crate) fn add(&mut self, points: &[[i32; 3]], fixed: &[[i32; 3]]) {
-        for &point in points {
-            self.offer(point);
+        let cells = self.cells;
+        let cell = |[x, y, _]: [i32; 3]| cells.of(x, y);
+        // Neighbours one after the other mostly lie in one cell.
+        for points in points.chunk_by(|a, b| cell(*a) == cell(*b)) {
+            points.iter().copied().min_by_key(|&p| cells.rank(p)).into_iter().for_each(|point| self.offer(point));
         }
         self.hull = hull_corners(points.iter().chain(&self.hull).copied().collect());
         self.fixed.extend(fixed);
@@ -73,9 +76,8 @@ impl Seeds {
 
     fn offer(&mut self, point: [i32; 3]) {
         let cells = self.cells;
-        let rank = |p: [i32; 3]| (cells.distance_from_middle(p), p);
         let nearest = self.by_cell.entry(cells.of(point[0], point[1])).or_insert(point);
-        *nearest = [*nearest, point].into_iter().min_by_key(|&p| rank(p)).unwrap_or(point);
+        *nearest = std::cmp::min_by_key(*nearest, point, |&p| cells.rank(p));
     }
 
     /// Adds the seeds of other blocks.

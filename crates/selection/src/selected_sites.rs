@@ -18,8 +18,18 @@ pub struct SelectedSites {
     first: [i32; 2],
     columns: usize,
     rows: usize,
-    points: Vec<Vec<[i32; 3]>>,
+    points: Vec<CellSites>,
     count: u64,
+    /// The cells that have points which were added last.
+    grown: Vec<u32>,
+}
+
+/// The selected points of a cell.
+#[derive(Clone, Debug, Default)]
+struct CellSites {
+    points: Vec<[i32; 3]>,
+    /// The number of those that were not added last.
+    known: u32,
 }
 
 impl SelectedSites {
@@ -34,32 +44,48 @@ impl SelectedSites {
         }
         let (first, last) = (cells.of(bounds.min[0], bounds.min[1]), cells.of(bounds.max[0], bounds.max[1]));
         let [columns, rows] = [0, 1].map(|axis| (last[axis] - first[axis] + 1) as usize);
-        SelectedSites { cells, first, columns, rows, points: vec![Vec::new(); columns * rows], count: 0 }
-    }
-
-    /// Returns the row and the column of the cell that a point lies in.
-    pub(crate) fn cell_of(&self, point: [i32; 3]) -> [usize; 2] {
-        let [column, row] = self.cells.of(point[0], point[1]);
-        [(row - self.first[1]) as usize, (column - self.first[0]) as usize]
-    }
-
-    /// Returns the numbers of the rows and of the columns whose cells meet `bounds`.
-    pub(crate) fn rows_and_columns(&self, bounds: Bounds<2>) -> [Range<usize>; 2] {
-        [1, 0].map(|axis| self.lines(axis, f64::from(bounds.min[axis]), f64::from(bounds.max[axis])))
+        SelectedSites {
+            cells,
+            first,
+            columns,
+            rows,
+            points: vec![CellSites::default(); columns * rows],
+            count: 0,
+            grown: Vec::new(),
+        }
     }
 
     /// Returns no point of the same cloud.
     pub(crate) fn emptied(&self) -> SelectedSites {
-        SelectedSites { points: vec![Vec::new(); self.points.len()], count: 0, ..*self }
+        SelectedSites { points: vec![CellSites::default(); self.points.len()], count: 0, grown: Vec::new(), ..*self }
     }
 
     /// Adds points that are none of it.
-    pub(crate) fn add(&mut self, points: &[[i32; 3]]) {
-        for point in points {
-            let [row, column] = self.cell_of(*point);
-            self.points[row * self.columns + column].push(*point);
+    pub(crate) fn add(&mut self, points: impl IntoIterator<Item = [i32; 3]>) {
+        for cell in std::mem::take(&mut self.grown) {
+            let cell = &mut self.points[cell as usize];
+            cell.known = cell.points.len() as u32;
         }
-        self.count += points.len() as u64;
+        for point in points {
+            let [column, row] = self.cells.of(point[0], point[1]);
+            let number = (row - self.first[1]) as usize * self.columns + (column - self.first[0]) as usize;
+            let cell = &mut self.points[number];
+            if cell.points.len() == cell.known as usize {
+                self.grown.push(number as u32);
+            }
+            cell.points.push(point);
+            self.count += 1;
+        }
+    }
+
+    /// Returns the number of points that were added last to the cells that meet `bounds`.
+    pub(crate) fn newly_near(&self, bounds: Bounds<2>) -> usize {
+        self.cells_within(bounds).map(|cell| cell.points.len() - cell.known as usize).sum()
+    }
+
+    /// Returns the points in `bounds` that were added last, neighbours in the plane one after the other.
+    pub(crate) fn newly_within(&self, bounds: Bounds<2>) -> impl Iterator<Item = [i32; 3]> {
+        self.points_within(bounds, |cell| &cell.points[cell.known as usize..])
     }
 
     /// Returns the number of points.
@@ -74,11 +100,25 @@ impl SelectedSites {
 
     /// Returns the points in `bounds`, in no particular order.
     pub fn within(&self, bounds: Bounds<2>) -> impl Iterator<Item = [i32; 3]> {
+        self.points_within(bounds, |cell| &cell.points)
+    }
+
+    /// Returns those points in `bounds` that `of_cell` returns.
+    fn points_within<'a>(
+        &'a self,
+        bounds: Bounds<2>,
+        of_cell: impl Fn(&'a CellSites) -> &'a [[i32; 3]],
+    ) -> impl Iterator<Item = [i32; 3]> {
+        let is_inside = move |p: &&[i32; 3]| (0..2).all(|k| bounds.min[k] <= p[k] && p[k] <= bounds.max[k]);
+        self.cells_within(bounds).flat_map(move |cell| of_cell(cell).iter().filter(is_inside).copied())
+    }
+
+    /// Returns the cells that meet `bounds`.
+    fn cells_within(&self, bounds: Bounds<2>) -> impl Iterator<Item = &CellSites> {
         let columns = self.lines(0, f64::from(bounds.min[0]), f64::from(bounds.max[0]));
         let rows = self.lines(1, f64::from(bounds.min[1]), f64::from(bounds.max[1]));
-        let cells = rows.flat_map(move |row| columns.clone().map(move |column| row * self.columns + column));
-        let is_inside = move |p: &&[i32; 3]| (0..2).all(|k| bounds.min[k] <= p[k] && p[k] <= bounds.max[k]);
-        cells.flat_map(move |cell| self.points[cell].iter().filter(is_inside).copied())
+        let row = move |row: usize| row * self.columns + columns.start..row * self.columns + columns.end;
+        rows.flat_map(move |number| &self.points[row(number)])
     }
 
     /// Returns the numbers of the columns (axis 0) or rows (1) from coordinate `low` to `high`.
@@ -94,24 +134,39 @@ impl SelectedSites {
     pub(crate) fn deepest_inside(&self, corners: [Site; 3], disc: Disc) -> Option<[i32; 3]> {
         let [a, b, c] = corners;
         let mut deepest: Option<(f64, [i32; 3])> = None;
-        let side = self.cells.side() as f64;
-        for row in self.lines(1, disc.low(1), disc.high(1)) {
-            let south = (row as f64 + f64::from(self.first[1])) * side;
-            let [low, high] = disc.chord(south, south + side);
-            for column in self.lines(0, low, high) {
-                for &point in &self.points[row * self.columns + column] {
-                    let (site, from_centre) = ([point[0], point[1]], disc.distance_from_centre(point));
-                    if from_centre <= disc.reach
-                        && deepest.is_none_or(|(least, _)| from_centre < least)
-                        && !corners.contains(&site)
-                        && in_circle(a, b, c, site)
-                    {
-                        deepest = Some((from_centre, point));
-                    }
+        self.cells_of(disc).for_each(|cell| {
+            for &point in &cell.points {
+                let (site, from_centre) = ([point[0], point[1]], disc.squared_distance_from_centre(point));
+                if from_centre <= disc.reach * disc.reach
+                    && deepest.is_none_or(|(least, _)| from_centre < least)
+                    && !corners.contains(&site)
+                    && in_circle(a, b, c, site)
+                {
+                    deepest = Some((from_centre, point));
                 }
             }
-        }
+        });
         deepest.map(|(_, point)| point)
+    }
+
+    /// Tells whether one of the points that were added last lies inside the circle of the triangle of `corners`, which is `disc`.
+    pub(crate) fn has_newly_inside(&self, corners: [Site; 3], disc: Disc) -> bool {
+        let [a, b, c] = corners;
+        self.cells_of(disc).any(|cell| {
+            let mut newly = cell.points[cell.known as usize..].iter().map(|&[x, y, _]| [x, y]);
+            newly.any(|site| !corners.contains(&site) && in_circle(a, b, c, site))
+        })
+    }
+
+    /// Returns the cells that meet a disc, and some near it.
+    fn cells_of(&self, disc: Disc) -> impl Iterator<Item = &CellSites> {
+        let side = self.cells.side() as f64;
+        self.lines(1, disc.low(1), disc.high(1)).flat_map(move |row| {
+            let south = (row as f64 + f64::from(self.first[1])) * side;
+            let [low, high] = disc.chord(south, south + side);
+            let columns = self.lines(0, low, high);
+            &self.points[row * self.columns + columns.start..row * self.columns + columns.end]
+        })
     }
 }
 
@@ -140,6 +195,22 @@ impl Disc {
         Disc { centre: [a[0] + from_a[0], a[1] + from_a[1]], reach: radius * (1.0 + 1e-9) + 2.0 }
     }
 
+    /// Tells whether the circumscribed disc of the triangle of `corners` surely lies in `bounds`, in less time than it takes to find the disc.
+    ///
+    /// It does if its diameter, `p q r / area` with the lengths of the sides and twice the area of the triangle, is less than the distance of a
+    /// corner from the border.
+    #[inline(always)]
+    pub(crate) fn is_surely_in(corners: [Site; 3], bounds: &Bounds<2>) -> bool {
+        let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+        let squared = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]);
+        let inwards = |k: usize| (a[k] - f64::from(bounds.min[k])).min(f64::from(bounds.max[k]) - a[k]);
+        let distance = inwards(0).min(inwards(1));
+        let twice = orient2d(corners[0], corners[1], corners[2]) as f64;
+        // Rounding is far less than the factor allows for.
+        distance > 0.0
+            && squared(a, b) * squared(b, c) * squared(c, a) * (1.0 + 1e-9) < (distance * twice) * (distance * twice)
+    }
+
     /// Tells whether it surely lies in `bounds`.
     pub(crate) fn is_in(&self, bounds: &Bounds<2>) -> bool {
         (0..2).all(|k| f64::from(bounds.min[k]) <= self.low(k) && self.high(k) <= f64::from(bounds.max[k]))
@@ -158,9 +229,9 @@ impl Disc {
         self.centre[axis] + self.reach
     }
 
-    fn distance_from_centre(&self, point: [i32; 3]) -> f64 {
+    fn squared_distance_from_centre(&self, point: [i32; 3]) -> f64 {
         let [x, y] = [0, 1].map(|axis| f64::from(point[axis]) - self.centre[axis]);
-        (x * x + y * y).sqrt()
+        x * x + y * y
     }
 
     /// Returns the range of x where the disc meets the stripe of these y.

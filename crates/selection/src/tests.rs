@@ -1,5 +1,6 @@
 //! Selections compared with the plainest way to them.
 
+use crate::sample::{Sample, bound_of_samples, very_far_above};
 use crate::*;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
@@ -93,11 +94,36 @@ fn holds_the_others(selected: &BTreeSet<[i32; 3]>, points: &[[i32; 3]], holding:
     }
 }
 
-/// Does rounds on all points at once, each from nothing, from these seeds on.
+/// Does rounds on all points of one sample after the other at once, each from nothing, from these seeds on.
 fn plain_rounds(points: &[[i32; 3]], seeds: Vec<[i32; 3]>, bound: ErrorBound) -> Vec<[i32; 3]> {
     let mut selected: BTreeSet<[i32; 3]> = seeds.into_iter().collect();
+    for (number, sample) in Sample::ladder([0; 2]).enumerate() {
+        let points: Vec<[i32; 3]> = points.iter().copied().filter(|&p| sample.has(p)).collect();
+        if number > 0 {
+            let beyond = beyond(&points, &selected, very_far_above(bound));
+            selected.extend(beyond);
+        }
+        rounds_over(&points, &mut selected, if sample.is_all() { bound } else { bound_of_samples(bound) });
+    }
+    selected.into_iter().collect()
+}
+
+/// Returns the points that exceed the bound.
+fn beyond(points: &[[i32; 3]], selected: &BTreeSet<[i32; 3]>, bound: ErrorBound) -> Vec<[i32; 3]> {
+    let triangles = triangles_of(selected);
+    let exceeds = |p: [i32; 3]| move |t: &[[i32; 3]; 3]| owns(*t, p) && bound.is_exceeded_by(VerticalError::of(*t, p));
+    points.iter().copied().filter(|&p| !selected.contains(&p) && triangles.iter().any(exceeds(p))).collect()
+}
+
+fn triangles_of(selected: &BTreeSet<[i32; 3]>) -> Vec<[[i32; 3]; 3]> {
+    let all: Vec<[i32; 3]> = selected.iter().copied().collect();
+    let sites: Vec<Site> = all.iter().map(|p| [p[0], p[1]]).collect();
+    canonical(&sites).unwrap().corners().iter().map(|t| t.map(|v| all[v as usize])).collect()
+}
+
+fn rounds_over(points: &[[i32; 3]], selected: &mut BTreeSet<[i32; 3]>, bound: ErrorBound) {
     loop {
-        let worst = worst_points(points, &selected, bound);
+        let worst = worst_points(points, selected, bound);
         let beside = |a: &[[i32; 3]; 3], b: &[[i32; 3]; 3]| a.iter().filter(|corner| b.contains(corner)).count() == 2;
         let rank = |(error, p): (u64, [i32; 3])| (error, std::cmp::Reverse(p));
         let accepted = worst.iter().filter(|(triangle, own)| {
@@ -107,7 +133,7 @@ fn plain_rounds(points: &[[i32; 3]], seeds: Vec<[i32; 3]>, bound: ErrorBound) ->
         });
         let accepted: Vec<[i32; 3]> = accepted.map(|(_, (_, p))| *p).collect();
         if accepted.is_empty() {
-            return selected.into_iter().collect();
+            return;
         }
         selected.extend(accepted);
     }
@@ -118,11 +144,7 @@ type WorstPoint = ([[i32; 3]; 3], (u64, [i32; 3]));
 
 /// Returns the worst point of each triangle where it exceeds the bound.
 fn worst_points(points: &[[i32; 3]], selected: &BTreeSet<[i32; 3]>, bound: ErrorBound) -> Vec<WorstPoint> {
-    let all: Vec<[i32; 3]> = selected.iter().copied().collect();
-    let sites: Vec<Site> = all.iter().map(|p| [p[0], p[1]]).collect();
-    let mesh = canonical(&sites).unwrap();
-    let triangles = mesh.corners().iter().map(|t| t.map(|v| all[v as usize]));
-    let worst = triangles.filter_map(|triangle| {
+    let worst = triangles_of(selected).into_iter().filter_map(|triangle| {
         let candidates = points.iter().filter(|p| !selected.contains(*p) && owns(triangle, **p));
         let worst = candidates.map(|&p| (VerticalError::of(triangle, p), p));
         let worst = worst.max_by_key(|(error, p)| (error.numerator, std::cmp::Reverse(*p)));
@@ -244,8 +266,10 @@ fn rounds_select_about_as_many_points_as_greedy_insertion() {
     for steps in [4, 12, 40, 120, 400] {
         let bound = ErrorBound::new(steps, 1);
         let mut known = SelectedSites::none(bounds, points.len() as u64);
-        known.add(&hull);
-        let block = crate::block::Block::new(points.clone(), bounds, &known, &hull, canonical).unwrap();
+        known.add(hull.iter().copied());
+        let all = crate::block::PointsByPlace::of(&points, bounds);
+        let whole = Sample::all([0; 2]);
+        let block = crate::block::Block::new(all, bounds, whole, &known, &hull, canonical).unwrap();
         let greedy = crate::block::greedy_insertion(block, &mut known, bound);
         let (found, figures) = selected(&points, &[], 4_000, bound, true);
         assert!(greedy > 40 && found.len() as u64 * 100 <= greedy * 108, "{steps}: {} and {greedy}", found.len());
@@ -270,7 +294,7 @@ fn regions_depend_on_the_points_alone() {
             let mut cloud = Cloud::new(&points, &points[700..702], side, keeps);
             cloud.offset = offset.map(i64::from);
             let bounds = bounds_of(&points);
-            let found = crate::select::select_by_regions(&cloud, bounds, points.len() as u64, bound, sizes).unwrap();
+            let found = crate::select::select_by_regions(&cloud, bound, sizes).unwrap();
             let mut all: Vec<_> = found.sites.within(bounds).map(back).collect();
             all.sort_unstable();
             let worst = found.figures.worst.map(back);

@@ -27,7 +27,6 @@ use rust_decimal::Decimal;
 use selection::{
     BYTES_PER_LISTED, BYTES_PER_POINT, BYTES_PER_SELECTED, BlockPoints, ErrorBound, PointSource, SelectedSites,
 };
-use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use sys::{fault, interrupt};
@@ -243,8 +242,7 @@ impl<'a> PointsInBlocks<'a> {
             let wanted = sites.len() as u64 + duplicates;
             let bounds = delaunay::geometry::Bounds::of_points(sites.iter().map(|site| site.position));
             if let Some((bounds, selected)) = bounds.zip(selected) {
-                let selected: HashSet<Site> = selected.within(bounds).map(|[x, y, _]| [x, y]).collect();
-                sites.retain(|site| selected.contains(&site.position));
+                leave_selected(&mut sites, selected.within(bounds));
             }
             BucketSorter::new(&grid, &buckets).add(&sites)?;
             Ok([wanted, duplicates])
@@ -301,6 +299,23 @@ impl PointSource for PointsInBlocks<'_> {
             None => Ok(()),
         }
     }
+}
+
+/// Removes all but the selected sites. Sites are in the order of [`load_sites`]: by y, then x.
+fn leave_selected(sites: &mut Vec<Point>, selected: impl Iterator<Item = [i32; 3]>) {
+    // As an unsigned number, a coordinate with the sign bit turned is in the same order.
+    let key = |[x, y]: Site| {
+        let [y, x] = [y, x].map(|along| u64::from(along.cast_unsigned() ^ 1 << 31));
+        y << 32 | x
+    };
+    let mut selected: Vec<u64> = selected.map(|[x, y, _]| key([x, y])).collect();
+    radsort::sort(&mut selected);
+    let mut next = selected.into_iter().peekable();
+    sites.retain(|site| {
+        let place = key(site.position);
+        while next.next_if(|selected| *selected < place).is_some() {}
+        next.next_if_eq(&place).is_some()
+    });
 }
 
 #[cfg(test)]

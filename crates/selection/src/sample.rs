@@ -1,0 +1,85 @@
+//! Samples of a cloud, each a part of the next.
+
+use crate::error_bound::ErrorBound;
+
+/// Some of the points of a cloud: one of so many, chosen by a hash of the place.
+///
+/// Rounds go over a small sample first. What that has selected is where the rounds over a greater one begin, so that most points are looked at in
+/// few rounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Sample {
+    /// It has one of two to the power of so many points.
+    halvings: u32,
+    /// The steps in x and y from zero of the source coordinates to zero of the lattice.
+    offset: [i64; 2],
+}
+
+impl Sample {
+    /// The first sample has one of two to the power of so many points.
+    const FIRST: u32 = 4;
+    /// A sample has one of two to the power of so many points of the next.
+    const STEP: u32 = 2;
+
+    /// Tells whether it has all points.
+    pub(crate) fn is_all(self) -> bool {
+        self.halvings == 0
+    }
+
+    /// Returns all points, on a lattice with this offset.
+    pub(crate) fn all(offset: [i64; 2]) -> Sample {
+        Sample { halvings: 0, offset }
+    }
+
+    /// Returns the samples from the smallest on to all points.
+    pub(crate) fn ladder(offset: [i64; 2]) -> impl Iterator<Item = Sample> {
+        let steps = Sample::FIRST / Sample::STEP;
+        (0..=steps).rev().map(move |step| Sample { halvings: step * Sample::STEP, offset })
+    }
+
+    /// Tells whether it has a point.
+    #[inline]
+    pub(crate) fn has(self, [x, y, _]: [i32; 3]) -> bool {
+        if self.is_all() {
+            return true;
+        }
+        // All points of a sample are in greater ones, since these ask for fewer of the same bits.
+        let along = |value: i32, axis: usize| (i64::from(value) + self.offset[axis]) as u64;
+        let mut hash =
+            along(x, 0).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ along(y, 1).wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
+        hash = (hash ^ hash >> 32).wrapping_mul(0xFF51_AFD7_ED55_8CCD);
+        hash.leading_zeros() >= self.halvings
+    }
+}
+
+/// Returns the bound for samples. If it were that of all points, some percent of the vertices would be superfluous in the end.
+pub(crate) fn bound_of_samples(bound: ErrorBound) -> ErrorBound {
+    bound.times(4)
+}
+
+/// Returns the distance above which all points of a sample are selected at once. A quarter of the sample is within [`bound_of_samples`] of the
+/// mesh by then, so where another point is so far away, the ground is rough, and nearly all points are needed.
+pub(crate) fn very_far_above(bound: ErrorBound) -> ErrorBound {
+    bound.times(16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_is_a_part_of_the_next_wherever_the_lattice_begins() {
+        let points: Vec<[i32; 3]> = (0..40_000).map(|i| [i % 200 * 50, i / 200 * 50, 0]).collect();
+        let of = |sample: Sample, moved: i32| -> Vec<usize> {
+            (0..points.len()).filter(|&i| sample.has([points[i][0] - moved, points[i][1], 0])).collect()
+        };
+        let samples: Vec<Vec<usize>> = Sample::ladder([0; 2]).map(|sample| of(sample, 0)).collect();
+        let share = |sample: &Vec<usize>| sample.len() as f64 / points.len() as f64;
+        for (pair, wanted) in samples.windows(2).zip([1.0 / 16.0, 1.0 / 4.0]) {
+            assert!(pair[0].iter().all(|i| pair[1].binary_search(i).is_ok()));
+            assert!((share(&pair[0]) / wanted - 1.0).abs() < 0.1, "{}", share(&pair[0]));
+        }
+        assert_eq!(samples.last().map(Vec::len), Some(points.len()));
+        let moved: Vec<Vec<usize>> = Sample::ladder([777, 0]).map(|sample| of(sample, 777)).collect();
+        assert_eq!(moved, samples);
+    }
+}
