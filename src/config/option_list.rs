@@ -182,6 +182,7 @@ mod tests {
             ("[output.raster]", "compression", &["deflate", "none"]),
             ("[output.raster]", "products", &["height", "hillshade", "slope", "aspect"]),
             ("[output.raster]", "pmtiles", &["terrarium", "terrain-rgb"]),
+            ("[output.terrain]", "scheme", &["geographic", "web-mercator"]),
             ("[output]", "copyright", &[]),
             ("[output]", "imagery", &[]),
         ] {

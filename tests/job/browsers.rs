@@ -7,6 +7,7 @@ use std::process::Command;
 use serde_json::{Value, json};
 use tiles::tiles3d::globe::relative_transform;
 
+use crate::breaklines::Survey;
 use crate::clouds;
 use crate::common::shared;
 use crate::globe::{is_exact as is_leaf, wide, wide_in_many_tiles};
@@ -222,31 +223,88 @@ fn cesium_styles_by_class_and_intensity() {
     }
 }
 
-/// CesiumJS drapes imagery over terrain tiles, finds the heights of the mesh in them, and shows no hole from any side.
+/// Returns a job on hills with terrain tiles in a scheme.
+fn hills_for_globes(folder: &Path, scheme: &str) -> Job {
+    let cloud = clouds::write(folder, "cloud.csv", &hills_in_utm(40_000));
+    let terrain = format!("terrain = {{ format = \"quantized-mesh\", scheme = \"{scheme}\" }}");
+    let output = "format = \"3dtiles\"\nheight_offset = 40.0\nhull = \"whole\"";
+    Job::on(&[&cloud])
+        .tiles_of(3_000)
+        .with("input", "crs = \"EPSG:32633\"")
+        .with("output", output)
+        .with("output", &terrain)
+}
+
+/// Returns directions to look at a terrain from, near it and so far that the surroundings are seen too.
+fn views() -> Vec<[f64; 3]> {
+    (0..8).flat_map(|turn| [[f64::from(45 * turn), -35.0, 600.0], [f64::from(45 * turn), -60.0, 9_000.0]]).collect()
+}
+
+/// Opens the terrain tiles of a job in a page, asserts that all pixels of all views are covered, and returns what the page answers.
+#[track_caller]
+fn covered(job: &Job, chromium: &Path, page: &str, places: &[[f64; 3]], views: &[[f64; 3]]) -> Value {
+    let request = asked(job, &json!({"places": places, "views": views}));
+    let seen = answered(job, chromium, page, &request);
+    assert_eq!(seen["complaints"], json!([]), "{page}");
+    let background: Vec<u64> = serde_json::from_value(seen["background"].clone()).unwrap();
+    assert!(background.len() >= views.len() && background.iter().all(|pixels| *pixels == 0), "{page}: {background:?}");
+    seen
+}
+
+/// CesiumJS drapes imagery over terrain tiles of both schemes, finds the heights of the mesh in them, and shows no hole from any side, nor on the other side
+/// of the globe. 3d-tiles-renderer shows none either.
 #[test]
-fn cesium_takes_its_ground_from_terrain_tiles() {
+fn viewers_take_their_ground_from_terrain_tiles() {
     let Some(chromium) = chromium() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let cloud = clouds::write(folder.path(), "cloud.csv", &hills_in_utm(40_000));
-    let job = Job::on(&[&cloud]).tiles_of(3_000).with("input", "crs = \"EPSG:32633\"").with(
-        "output",
-        "format = \"3dtiles\"\nheight_offset = 40.0\nhull = \"whole\"\nterrain = { format = \"quantized-mesh\" }",
-    );
-    job.run();
-    let places = middles(&job, &tiles(&job));
-    // The first is near the middle of the terrain, and far from it the surroundings are seen too.
-    let views: Vec<[f64; 3]> = (0..8)
-        .flat_map(|turn| [[f64::from(45 * turn), -35.0, 600.0], [f64::from(45 * turn), -60.0, 9_000.0]])
-        .collect();
-    let request = asked(&job, &json!({"places": places, "views": views}));
-    let seen = answered(&job, &chromium, "terrain", &request);
-    assert_eq!((&seen["complaints"], &seen["hasNormals"]), (&json!([]), &json!(true)));
-    let off: Vec<f64> = serde_json::from_value(seen["off"].clone()).unwrap();
-    assert!(off.len() == 12 && off.iter().all(|off| off.abs() < 0.05), "{off:?}");
-    let background: Vec<u64> = serde_json::from_value(seen["background"].clone()).unwrap();
-    assert_eq!(background, vec![0; views.len()]);
-    let report = job.report();
-    assert_eq!(seen["zoom"].as_u64().unwrap() + 1, report["terrain"]["zooms"].as_array().unwrap().len() as u64);
+    let mut found: Vec<Vec<f64>> = Vec::new();
+    let mut step = 0.0;
+    for (scheme, projection) in [("geographic", "EPSG:4326"), ("web-mercator", "EPSG:3857")] {
+        let job = hills_for_globes(folder.path(), scheme);
+        let report = job.report();
+        let places = middles(&job, &tiles(&job));
+        let seen = covered(&job, &chromium, "terrain", &places, &views());
+        assert_eq!((&seen["hasNormals"], &seen["hasWaterMask"]), (&json!(true), &json!(false)));
+        assert_eq!(seen["isWebMercator"], json!(projection == "EPSG:3857"));
+        let off: Vec<f64> = serde_json::from_value(seen["off"].clone()).unwrap();
+        assert!(off.len() == 12 && off.iter().all(|off| off.abs() < 0.05), "{scheme}: {off:?}");
+        let zooms = report["terrain"]["zooms"].as_array().unwrap();
+        assert_eq!(seen["zoom"].as_u64().unwrap() + 1, zooms.len() as u64);
+        found.push(serde_json::from_value(seen["heights"].clone()).unwrap());
+        step += zooms.last().unwrap()["height_step"].as_f64().unwrap();
+
+        // Farther away, a few pixels are gaps beside tiles that it has split where there are no finer ones.
+        let near: Vec<[f64; 3]> = (0..8).map(|turn| [f64::from(45 * turn), -60.0, 400.0]).collect();
+        let seen = covered(&job, &chromium, "quantized", &places, &near);
+        assert_eq!(seen["projection"], projection);
+        let off: Vec<f64> = serde_json::from_value(seen["off"].clone()).unwrap();
+        assert!(off.len() == 12 && off.iter().all(|off| off.abs() < 0.05), "{scheme}: {off:?}");
+    }
+    // Half a step of each, and as much as the ground rises over half a step across: slopes are below 45 degrees.
+    let across = 0.01;
+    let apart = found[0].iter().zip(&found[1]).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max);
+    assert!(apart <= step / 2.0 + across, "{apart}, {step}");
+}
+
+/// The water mask of lakes arrives in CesiumJS, in both schemes.
+#[test]
+fn cesium_gets_the_water_mask_of_lakes() {
+    let Some(chromium) = chromium() else { return };
+    let survey = Survey::new(6_000);
+    for scheme in ["geographic", "web-mercator"] {
+        let terrain =
+            format!("height_offset = 40.0\nterrain = {{ format = \"quantized-mesh\", scheme = \"{scheme}\" }}");
+        let job = survey.job().with("output", &terrain);
+        job.run().succeeded();
+        // In the lake, on its island, and beside it: metres from the origin of the survey, and from the middle of the scene.
+        let georeference: Value =
+            serde_json::from_slice(&std::fs::read(job.out().join("georeference.json")).unwrap()).unwrap();
+        let offset = [0, 1, 2].map(|axis| georeference["offset"][axis].as_f64().unwrap());
+        let local = |[x, y, z]: [f64; 3]| [500_000.0 + x - offset[0], 4_000_000.0 + y - offset[1], z - offset[2]];
+        let places = [[100.0, 85.0, 10.0], [130.0, 110.0, 10.0], [112.0, 105.0, 10.0], [60.0, 60.0, 15.0]].map(local);
+        let seen = covered(&job, &chromium, "terrain", &places, &views());
+        assert_eq!((&seen["hasWaterMask"], &seen["masks"]), (&json!(true), &json!([255, 255, 0, 0])), "{scheme}");
+    }
 }
 
 #[track_caller]

@@ -1,18 +1,22 @@
-//! `[output.terrain]`: the tiles are those of the mesh, whatever the tiles of the job, threads and parts.
+//! `[output.terrain]`: the tiles are those of the mesh, in both schemes, whatever the tiles of the job, threads, parts and tasks.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::fs;
 use std::io::Read;
 use std::path::Path;
 
 use flate2::read::GzDecoder;
+use proj4rs::{Proj, transform::transform};
 use quantized_mesh::{DecodedTile, decode};
 use serde_json::Value;
 
+use crate::breaklines::{Survey, in_lake};
 use crate::clouds;
 use crate::levels::hills;
 use crate::parts::{in_files, in_parts};
-use crate::program::{Job, number};
+use crate::program::{Job, gdt_batch, number};
+use crate::random::Random;
 use crate::tileset::files_below;
 
 const TERRAIN: &str = "terrain = { format = \"quantized-mesh\" }";
@@ -50,14 +54,28 @@ fn side(tile: &DecodedTile, side: usize) -> Vec<(u16, f64)> {
     tile.sides[side].iter().map(|&v| (tile.vertices[v as usize][along], tile.height(v as usize))).collect()
 }
 
+/// The tiling schemes, with the columns of their zoom 0.
+const SCHEMES: [(&str, i64); 2] = [("geographic", 2), ("web-mercator", 1)];
+
+/// The option for terrain tiles in a scheme.
+fn terrain_in(scheme: &str) -> String {
+    format!("terrain = {{ format = \"quantized-mesh\", scheme = \"{scheme}\" }}")
+}
+
 #[test]
 fn terrain_tiles_do_not_depend_on_tiles_threads_and_parts() {
+    for (scheme, columns) in SCHEMES {
+        do_not_depend_on_tiles_threads_and_parts(scheme, columns);
+    }
+}
+
+fn do_not_depend_on_tiles_threads_and_parts(scheme: &str, columns: i64) {
     let folder = tempfile::tempdir().unwrap();
     let points = hills_in_utm(20_000);
     let cloud = clouds::write(folder.path(), "cloud.csv", &points);
     let job = |job: Job| {
         let job = job.with("input", "crs = \"EPSG:32633\"").with("output", "height_offset = \"egm96\"");
-        job.with("output", TERRAIN)
+        job.with("output", &terrain_in(scheme))
     };
     let first = job(Job::on(&[&cloud]).tiles_of(20_000));
     first.run();
@@ -87,8 +105,10 @@ fn terrain_tiles_do_not_depend_on_tiles_threads_and_parts() {
     // Neighbours have the same vertices between them, at the same heights to the last bit.
     let mut pairs = 0;
     for (&[zoom, x, y], tile) in &tiles {
-        for (beside, own, other) in [([zoom, x + 1, y], 2, 0), ([zoom, x, y + 1], 3, 1)] {
-            if let Some(beside) = tiles.get(&beside).filter(|_| zoom > 0) {
+        assert_eq!((tile.fault(), &tile.water), (None, &None));
+        let east = (x + 1) % (columns << zoom);
+        for (beside, own, other) in [([zoom, east, y], 2, 0), ([zoom, x, y + 1], 3, 1)] {
+            if let Some(beside) = tiles.get(&beside) {
                 assert_eq!(side(tile, own), side(beside, other), "{zoom}/{x}/{y}");
                 pairs += 1;
             }
@@ -99,6 +119,115 @@ fn terrain_tiles_do_not_depend_on_tiles_threads_and_parts() {
     let finest = tiles.iter().filter(|([zoom, ..], _)| *zoom as u64 == number(&list["maxzoom"]));
     let triangles: usize = finest.map(|(_, tile)| tile.triangles.len()).sum();
     assert!(triangles as u64 > number(&report["triangles"]));
+    first.verified();
+}
+
+/// Returns longitude and latitude of a place of the survey in radians: centimetres from its origin.
+fn on_the_globe([x, y]: [i64; 2]) -> [f64; 2] {
+    let proj = |text: &str| Proj::from_proj_string(text).unwrap();
+    let mut point = (500_000.0 + x as f64 / 100.0, 4_000_000.0 + y as f64 / 100.0, 0.0);
+    transform(&proj("+proj=utm +zone=33 +datum=WGS84"), &proj("+proj=longlat +datum=WGS84"), &mut point).unwrap();
+    [point.0, point.1]
+}
+
+/// Returns what the water mask of the tile over a place has there.
+fn water_at(tiles: &BTreeMap<[i64; 3], DecodedTile>, zoom: i64, columns: i64, place: [f64; 2]) -> u8 {
+    let rows = (1i64 << zoom) as f64;
+    // The latitude of a border of rows, and so the place between both.
+    let border = |row: f64| match columns {
+        2 => row / rows * PI - PI / 2.0,
+        _ => ((2.0 * row / rows - 1.0) * PI).sinh().atan(),
+    };
+    let row = (0..zoom)
+        .rev()
+        .fold(0, |row, bit| row + if place[1] >= border((row + (1 << bit)) as f64) { 1 << bit } else { 0 });
+    let share = (place[1] - border(row as f64)) / (border((row + 1) as f64) - border(row as f64));
+    let column = (place[0] / PI + 1.0) / 2.0 * (columns << zoom) as f64;
+    let mask = tiles[&[zoom, column as i64, row]].water.as_ref().unwrap();
+    let cell = |along: f64| (along * 256.0) as usize;
+    mask.get(cell(1.0 - share) * 256 + cell(column.fract())).copied().unwrap_or(mask[0])
+}
+
+/// The water masks have the lake and not its island, at all zooms where a cell is small beside them, whatever the tiles of the job, threads, parts and tasks.
+#[test]
+fn lakes_are_in_the_water_masks_of_all_zooms() {
+    let survey = Survey::new(6_000);
+    for (scheme, columns) in SCHEMES {
+        let job = || survey.job().with("output", "height_offset = 0.0").with("output", &terrain_in(scheme));
+        let first = job();
+        first.run().succeeded();
+        first.verified();
+        let expected = files(&first);
+        let parts = || job().tiles_of(400).with("triangulation", "max_points_per_part = 1500");
+        let one = parts().threads(1);
+        one.run().succeeded();
+        assert!(files(&one) == expected);
+        let tasks = parts();
+        let config = tasks.config();
+        gdt_batch(tasks.folder(), &["submit", config.to_str().unwrap(), "--engine", "local", "--tasks", "3"])
+            .succeeded();
+        assert!(files(&tasks) == expected);
+
+        let list: Value = serde_json::from_slice(&expected["layer.json"]).unwrap();
+        assert_eq!(list["extensions"], serde_json::json!(["octvertexnormals", "watermask"]));
+        let tiles = tiles(&expected);
+        assert!(tiles.values().all(|tile| tile.water.is_some() && tile.fault().is_none()));
+        let finest = number(&list["maxzoom"]) as i64;
+        let mut random = Random(7);
+        for back in 0..3 {
+            // Metres: farther than a cell from the shore there is no doubt.
+            let cell = 40_000_000.0 / 256.0 / (columns << (finest - back)) as f64;
+            let mut counts = [0; 2];
+            for _ in 0..6_000 {
+                let place = [0; 2].map(|_| random.below(16_000) as i64);
+                let near = [[-1, -1], [1, -1], [-1, 1], [1, 1], [0, 0]].map(|offset: [i64; 2]| {
+                    let beside = [0, 1].map(|axis: usize| place[axis] + (offset[axis] as f64 * cell * 100.0) as i64);
+                    in_lake(beside)
+                });
+                if near.iter().all(|beside| *beside == near[4]) {
+                    let found = water_at(&tiles, finest - back, columns, on_the_globe(place));
+                    assert_eq!(found == 255, near[4], "{scheme} {back}: {place:?}");
+                    counts[usize::from(near[4])] += 1;
+                }
+            }
+            assert!(counts.iter().all(|count| *count > 100), "{counts:?}");
+        }
+    }
+}
+
+/// Web mercator ends before the pole.
+#[test]
+fn a_terrain_beyond_web_mercator_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let north: clouds::Cloud = hills_in_utm(800).into_iter().map(|[x, y, z]| [x, y + 4_200_000, z]).collect();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &north);
+    let job =
+        |scheme: &str| Job::on(&[&cloud]).with("input", "crs = \"EPSG:32633\"").with("output", &terrain_in(scheme));
+    let told = ["the terrain reaches 85.", "web mercator ends at 85.05 degrees", "fix: scheme = \"geographic\""];
+    job("web-mercator").run().refused(2, &told);
+    job("web-mercator").run_with(&["check"]).refused(2, &told);
+    job("geographic").run().succeeded();
+}
+
+/// A terrain across the 180th meridian is in both ends of the one tile of zoom 0 in web mercator.
+#[test]
+fn a_terrain_across_the_180th_meridian_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let wide: clouds::Cloud = hills(4_000, 5).into_iter().map(|[x, y, z]| [x + 160_000, y + 1_000_000, z]).collect();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &wide);
+    for (scheme, columns) in SCHEMES {
+        let job = Job::on(&[&cloud]).with("input", "crs = \"EPSG:32601\"").with("output", &terrain_in(scheme));
+        job.run().succeeded();
+        job.verified();
+        let tiles = tiles(&files(&job));
+        for (name, tile) in &tiles {
+            assert_eq!(tile.fault(), None, "{scheme} {name:?}");
+        }
+        let ends =
+            |zoom: i64| tiles.keys().filter(|[z, x, _]| *z == zoom && [0, (columns << zoom) - 1].contains(x)).count();
+        assert!((1..8).all(|zoom| ends(zoom) >= 2), "{scheme}");
+        assert_eq!(ends(0) as i64, columns);
+    }
 }
 
 #[test]

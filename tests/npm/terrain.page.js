@@ -1,6 +1,6 @@
-// The page of terrain.html: shows terrain/ on a globe with imagery, and sends the server the heights at some places and how much of the
-// background is seen.
-const { Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color, EllipsoidTerrainProvider, HeadingPitchRange, Math: Angles, Matrix4, UrlTemplateImageryProvider, sampleTerrainMostDetailed } = window.Cesium;
+// The page of terrain.html: shows terrain/ on a globe with imagery, and sends the server the heights and the water mask at some places, and how much of
+// the background is seen.
+const { Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color, EllipsoidTerrainProvider, HeadingPitchRange, Math: Angles, Matrix4, Rectangle, UrlTemplateImageryProvider, WebMercatorTilingScheme, sampleTerrainMostDetailed } = window.Cesium;
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 const complaints = [];
@@ -40,8 +40,26 @@ function holes(scene) {
   return count;
 }
 
+// Returns what the water mask of the finest tile has at a place.
+async function maskAt(provider, place) {
+  const scheme = provider.tilingScheme;
+  const level = provider.availability.computeMaximumLevelAtPosition(place);
+  const { x, y } = scheme.positionToTileXY(place, level);
+  const { waterMask } = await provider.requestTileGeometry(x, y, level);
+  if (!waterMask || waterMask.length === 1) return waterMask?.[0] ?? null;
+  const side = Math.sqrt(waterMask.length);
+  const { west, north, width, height } = rectangle(scheme, x, y, level);
+  const cell = (along) => Math.floor(along * side);
+  return waterMask[cell((north - place.latitude) / height) * side + cell((place.longitude - west) / width)];
+}
+
+function rectangle(scheme, x, y, level) {
+  const { west, south, east, north } = scheme.tileXYToRectangle(x, y, level, new Rectangle());
+  return { west, north, width: east - west, height: north - south };
+}
+
 async function show({ places, views }) {
-  const provider = await CesiumTerrainProvider.fromUrl('/out/terrain', { requestVertexNormals: true });
+  const provider = await CesiumTerrainProvider.fromUrl('/out/terrain', { requestVertexNormals: true, requestWaterMask: true });
   const widget = new CesiumWidget('scene', {
     baseLayer: false, skyBox: false, skyAtmosphere: false, useDefaultRenderLoop: false, terrainProvider: new EllipsoidTerrainProvider(),
     creditContainer: document.createElement('div'), contextOptions: { webgl: { preserveDrawingBuffer: true } },
@@ -61,7 +79,10 @@ async function show({ places, views }) {
   const positions = places.map((place) => Cartographic.fromCartesian(Matrix4.multiplyByPoint(toEarth, Cartesian3.fromArray(place), new Cartesian3())));
   const truth = positions.map((position) => position.height);
   const sampled = await sampleTerrainMostDetailed(provider, positions.map((position) => position.clone()));
-  const off = sampled.map((position, k) => position.height - truth[k]);
+  const heights = sampled.map((position) => position.height);
+  const off = heights.map((height, k) => height - truth[k]);
+  const masks = [];
+  for (const position of positions) masks.push(await maskAt(provider, position));
 
   const background = [];
   const middle = Cartesian3.fromRadians(positions[0].longitude, positions[0].latitude, truth[0]);
@@ -71,7 +92,14 @@ async function show({ places, views }) {
     background.push(holes(scene));
     if (failures.length > 0) throw new Error(failures.join('; '));
   }
-  return { off, background, zoom: provider.availability.computeMaximumLevelAtPosition(positions[0]), hasNormals: provider.hasVertexNormals, complaints, picture: scene.canvas.toDataURL('image/png') };
+  const shot = scene.canvas.toDataURL('image/png');
+  // Around the globe, all tiles are there too.
+  const { longitude, latitude } = positions[0];
+  scene.camera.lookAtTransform(Matrix4.IDENTITY);
+  scene.camera.setView({ destination: Cartesian3.fromRadians(longitude + Math.PI, -latitude, 1e6) });
+  await settled(scene);
+  background.push(holes(scene));
+  return { off, heights, masks, background, hasWaterMask: provider.hasWaterMask, isWebMercator: provider.tilingScheme instanceof WebMercatorTilingScheme, zoom: provider.availability.computeMaximumLevelAtPosition(positions[0]), hasNormals: provider.hasVertexNormals, complaints, picture: shot };
 }
 
 let result;

@@ -2,7 +2,7 @@
 // Chromium and prints as JSON what it shows: triangles, bounds, and the heights at the "places" of the request, a list of [x, y] in
 // metres from the scene's origin. PAGE "view", the default, shows tileset.json with 3d-tiles-renderer and terrain.glb with
 // GLTFLoader, both in three.js. PAGE "cesium" shows tileset.json on the globe with CesiumJS,
-// and PAGE "terrain" shows terrain/ there, with imagery: its request has "places" with heights, and "views".
+// and PAGE "terrain" shows terrain/ there, with imagery, or PAGE "quantized" in three.js: their request has "places" with heights, and "views".
 import { createServer } from 'node:http';
 import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';

@@ -4,7 +4,9 @@ use crate::rig::{Rig, Setup};
 use crate::scattered;
 
 fn with_terrain() -> Setup {
-    Setup::tiles_of(1_500).input("crs = \"EPSG:32633\"").output("terrain = { format = \"quantized-mesh\" }")
+    Setup::tiles_of(1_500)
+        .input("crs = \"EPSG:32633\"")
+        .output("terrain = { format = \"quantized-mesh\", scheme = \"web-mercator\" }")
 }
 
 #[test]

@@ -54,7 +54,7 @@ impl DropIndex {
     /// Returns the index of these subsegments and lakes. Cells have sides of `least_side` lattice steps or more.
     pub(crate) fn new(subsegments: impl Iterator<Item = [Site; 2]>, lakes: Lakes, least_side: u32) -> DropIndex {
         let discs: Vec<_> = subsegments.map(|[a, b]| (disc_box(a, b), [a, b])).collect();
-        let shores = lakes.shores().map(|[a, b]| segment_box(a, b));
+        let shores = lakes.shores().map(|(_, [a, b])| segment_box(a, b));
         let bounds = discs.iter().map(|(bounds, _)| *bounds).chain(shores).reduce(Bounds::union);
         let most = (CELLS_EACH * discs.len() as i64).clamp(1, MOST_CELLS);
         let layout = Layout::new(bounds.unwrap_or(Bounds::of_point([0, 0])), most, least_side.into());
@@ -92,6 +92,11 @@ impl DropIndex {
             self.discs.any(|bounds| meet(bounds, &point), |[a, b]| in_disc(a, b, place))
         };
         is_in_disc || (cell.has_shore && self.is_water(Fraction::middle_of(&[place])))
+    }
+
+    /// Returns the lakes.
+    pub(crate) fn lakes(&self) -> &Lakes {
+        &self.lakes
     }
 
     /// Returns whether the point is inside a lake.
@@ -178,7 +183,7 @@ impl Layout {
             return water;
         }
         let length = self.side.min(1 << 30) as u32;
-        for bounds in lakes.shores().flat_map(|[a, b]| piece_boxes(a, b, length)) {
+        for bounds in lakes.shores().flat_map(|(_, [a, b])| piece_boxes(a, b, length)) {
             self.for_each_cell(&bounds, |cell| water[cell] = Water::Shore);
         }
         let corner = |axis: usize, line: usize| (i64::from(self.extent.min[axis]) + line as i64 * self.side) as i32;

@@ -96,7 +96,7 @@ impl Lakes {
     }
 
     /// Returns all segments of all shores.
-    pub(crate) fn shores(&self) -> impl Iterator<Item = [Site; 2]> + '_ {
-        self.shores.iter().flat_map(BoxTree::items)
+    pub(crate) fn shores(&self) -> impl Iterator<Item = Shore> + '_ {
+        (0..).zip(&self.shores).flat_map(|(lake, shore)| shore.items().map(move |ends| (lake, ends)))
     }
 }

@@ -77,6 +77,12 @@ impl Breaklines {
         self.index.drops(place)
     }
 
+    /// Returns the edges of the shores of all lakes, each with the number of its lake. A place is in a lake if a line from there crosses its shore an odd
+    /// number of times.
+    pub fn shores(&self) -> impl Iterator<Item = (u32, [Site; 2])> + '_ {
+        self.index.lakes().shores()
+    }
+
     /// Returns whether the triangle lies inside a lake, on its flat water. The triangle must be one of the mesh.
     pub fn is_water(&self, triangle: [Site; 3]) -> bool {
         self.index.is_water(Fraction::middle_of(&triangle))

@@ -4,6 +4,7 @@
 //! alone. So a tile needs no neighbour, and meets all of them.
 
 use crate::bound::{FIRST_FLAT_ZOOM, steps};
+use crate::halves::Halves;
 use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, in_order};
 use crate::refine::refined;
 use crate::rough::Cells;
@@ -34,9 +35,9 @@ const SCALE: i32 = 1024;
 /// # Errors
 /// [`delaunay::Error::Stopped`].
 pub fn coarser(tile: Tile, children: &[Child], outside: i32) -> Result<(TileMesh, u64), delaunay::Error> {
-    let [on_border, inside] = candidates(children);
-    let mut fixed = border(&on_border, tile.zoom, outside);
-    fixed.extend(grid(&inside, &fixed, tile.zoom));
+    let [on_border, inside] = candidates(tile, children);
+    let mut fixed = border(&on_border, tile, outside);
+    fixed.extend(grid(&inside, &fixed, tile));
     fixed.sort_unstable_by_key(|node| node.order());
     fixed.dedup_by_key(|node| node.order());
     let source = TileSource { tile, fixed: &fixed, inside: &inside, outside };
@@ -50,8 +51,9 @@ pub fn flat(tile: Tile) -> Result<TileMesh, delaunay::Error> {
 
 /// Returns the vertices of all children as a tile of the zoom before has them, those on its border and the others, in order. Of those that come together
 /// the highest of the terrain stays.
-fn candidates(children: &[Child]) -> [Vec<Node>; 2] {
+fn candidates(tile: Tile, children: &[Child]) -> [Vec<Node>; 2] {
     let [mut on_border, mut inside] = [Vec::new(), Vec::new()];
+    let [columns, rows] = Halves::of(tile);
     let has = |quadrant: [u8; 2]| children.iter().any(|child| child.quadrant == quadrant);
     let mut ordered: Vec<&Child> = children.iter().collect();
     ordered.sort_by_key(|child| [child.quadrant[1], child.quadrant[0]]);
@@ -60,28 +62,19 @@ fn candidates(children: &[Child]) -> [Vec<Node>; 2] {
         for node in nodes {
             let is_outer = |along: u16, half: u8| along == if half == 0 { 0 } else { LAST };
             if is_outer(node.u, *east) || is_outer(node.v, *north) {
-                let [u, v] = [(node.u, *east), (node.v, *north)].map(|(along, half)| halved_on_border(along, half));
+                let [u, v] = [columns.on_border(node.u, *east), rows.on_border(node.v, *north)];
                 on_border.push(Node { u, v, h: node.h });
             } else if !(west_has && node.u == 0 || south_has && node.v == 0) {
-                let [u, v] = [(node.u, *east), (node.v, *north)].map(|(along, half)| halved_inside(along, half));
+                let [u, v] = [columns.inside(node.u, *east), rows.inside(node.v, *north)];
                 inside.push(Node { u, v, h: node.h });
             }
         }
     }
     on_border.sort_unstable_by_key(|node| node.order());
+    if !rows.are_even() {
+        inside.sort_unstable_by_key(|node| node.order());
+    }
     [on_border, inside].map(each_once)
-}
-
-/// Returns where a vertex of a child lies in its parent, if it lies on the border of that. Only what lies at a corner comes to lie there.
-fn halved_on_border(steps: u16, half: u8) -> u16 {
-    let doubled = u32::from(steps) + u32::from(half) * u32::from(LAST);
-    let halved = (doubled / 2) as u16;
-    if doubled == 0 || doubled == 2 * u32::from(LAST) { halved } else { halved.clamp(1, LAST - 1) }
-}
-
-/// Returns where it lies otherwise: not on the border. Vertices stay in order, but for a few that would be on the border.
-fn halved_inside(steps: u16, half: u8) -> u16 {
-    (steps / 2 + u16::from(half) * LAST.div_ceil(2)).clamp(1, LAST - 1)
 }
 
 /// Puts nodes that are nearly in order into it, each place once.
@@ -105,7 +98,7 @@ fn each_once(mut nodes: Vec<Node>) -> Vec<Node> {
 }
 
 /// Returns the vertices along the sides: selected ones of `on_border`, and the corners.
-fn border(on_border: &[Node], zoom: u8, outside: i32) -> Vec<Node> {
+fn border(on_border: &[Node], tile: Tile, outside: i32) -> Vec<Node> {
     let mut border: Vec<Node> = Vec::new();
     for corner in 0..4 {
         let [u, v] = corner_place(corner);
@@ -124,8 +117,8 @@ fn border(on_border: &[Node], zoom: u8, outside: i32) -> Vec<Node> {
             on_border.iter().filter(|node| node.corner().is_none()).filter_map(along).collect();
         of_side.extend(ends);
         of_side.sort_unstable_by_key(|(along, _)| *along);
-        let selected = selected_along(&of_side, zoom, outside);
-        border.extend(on_grid(&selected, zoom, outside).into_iter().map(|(along, h)| {
+        let selected = selected_along(&of_side, tile, outside);
+        border.extend(on_grid(&selected, tile, outside).into_iter().map(|(along, h)| {
             let [u, v] = if side < 2 { [end, along] } else { [along, end] };
             Node { u, v, h }
         }));
@@ -134,10 +127,10 @@ fn border(on_border: &[Node], zoom: u8, outside: i32) -> Vec<Node> {
     border
 }
 
-/// Returns vertices where the lines of the grid of a zoom meet a side, on the straight lines between selected ones: steps along the side, and
+/// Returns vertices where the lines of the grid of a tile meet a side, on the straight lines between selected ones: steps along the side, and
 /// heights.
-fn on_grid(selected: &[(u16, Node)], zoom: u8, outside: i32) -> Vec<(u16, i32)> {
-    let lines = grid_lines(zoom);
+fn on_grid(selected: &[(u16, Node)], tile: Tile, outside: i32) -> Vec<(u16, i32)> {
+    let lines = grid_lines(tile);
     let inner = lines.get(1..lines.len() - 1).unwrap_or_default();
     let height = |&line: &u16| {
         let after = selected.partition_point(|(along, _)| *along < line);
@@ -155,16 +148,17 @@ fn on_grid(selected: &[(u16, Node)], zoom: u8, outside: i32) -> Vec<(u16, i32)> 
     inner.iter().filter_map(height).collect()
 }
 
-/// Returns where the lines of the grid of a zoom are, with both ends.
-fn grid_lines(zoom: u8) -> Vec<u16> {
+/// Returns where the lines of the grid of a tile are, with both ends.
+fn grid_lines(tile: Tile) -> Vec<u16> {
+    let zoom = tile.geographic_zoom();
     let count = if zoom < FIRST_FLAT_ZOOM { (32u32 >> (zoom / 2)).max(1) } else { 1 };
     (0..=count).map(|line| (line * u32::from(LAST) / count) as u16).collect()
 }
 
 /// Returns vertices for the curve of the earth: of each cell of the grid one of those that may be selected, or where four cells without any meet,
 /// one beside the terrain.
-fn grid(inside: &[Node], border: &[Node], zoom: u8) -> Vec<Node> {
-    let lines = grid_lines(zoom);
+fn grid(inside: &[Node], border: &[Node], tile: Tile) -> Vec<Node> {
+    let lines = grid_lines(tile);
     if lines.len() < 3 {
         return Vec::new();
     }
@@ -196,8 +190,9 @@ struct TileSource<'a> {
 impl TileSource<'_> {
     /// Returns the places in a step along both axes.
     fn scale(&self) -> [i32; 2] {
-        let cosine = libm::cos(self.tile.middle_latitude());
-        [((f64::from(SCALE) * cosine + 0.5) as i32).clamp(1, SCALE), SCALE]
+        let [width, height] = self.tile.sides();
+        let wider = width / height * libm::cos(self.tile.middle()[1]);
+        [((f64::from(SCALE) * wider + 0.5) as i32).clamp(1, SCALE), SCALE]
     }
 
     fn point(&self, node: &Node) -> [i32; 3] {
@@ -220,7 +215,7 @@ impl TileSource<'_> {
             return None;
         }
         let cells = Cells::new(self.inside);
-        let is_rough = cells.off_plane(2 * steps(self.tile.zoom)) > MOST_VERTICES / 2;
+        let is_rough = cells.off_plane(2 * steps(self.tile.scheme, self.tile.zoom)) > MOST_VERTICES / 2;
         is_rough.then(|| {
             let mut medians = cells.medians();
             medians.extend(self.inside.iter().filter(|node| node.h == OUTSIDE));
@@ -232,7 +227,7 @@ impl TileSource<'_> {
 
     /// Returns the mesh of the vertices that the bound of the zoom selects, and this bound, or a greater one if these would be too many.
     fn selected(&self) -> Result<(TileMesh, u64), delaunay::Error> {
-        let bound = steps(self.tile.zoom);
+        let bound = steps(self.tile.scheme, self.tile.zoom);
         let first: Vec<[i32; 3]> = self.fixed.iter().map(|node| self.point(node)).collect();
         let points: Vec<[i32; 3]> =
             self.inside.iter().filter(|node| !self.is_fixed(node)).map(|node| self.point(node)).collect();
@@ -245,7 +240,7 @@ impl TileSource<'_> {
 
     fn is_fixed(&self, node: &Node) -> bool {
         // Without a grid all fixed vertices lie on the border.
-        self.tile.zoom < FIRST_FLAT_ZOOM
+        self.tile.geographic_zoom() < FIRST_FLAT_ZOOM
             && self.fixed.binary_search_by_key(&node.order(), |fixed| fixed.order()).is_ok()
     }
 

@@ -1,7 +1,8 @@
 //! Reading a tile.
 
-use crate::encode::NORMALS;
+use crate::encode::{NORMALS, WATER_MASK};
 use crate::mesh::LAST;
+use crate::water::is_mask;
 
 /// What a tile holds.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,6 +17,9 @@ pub struct DecodedTile {
     pub sides: [Vec<u32>; 4],
     /// Normals as two bytes of an octahedron, if there are any.
     pub normals: Vec<[u8; 2]>,
+    /// The water mask, if there is one: one number for all of the tile, or those of 256 x 256 cells, from the north-west on, row by row. 255 is water, and
+    /// 0 is land.
+    pub water: Option<Vec<u8>>,
 }
 
 impl DecodedTile {
@@ -32,7 +36,7 @@ impl DecodedTile {
         self.sides[side].iter().map(move |&v| (self.vertices[v as usize][along], self.height(v as usize)))
     }
 
-    /// Returns what is wrong with the mesh, if it does not cover the tile or does not name the vertices of its sides.
+    /// Returns what is wrong with the tile, if its mesh does not cover it or does not name the vertices of its sides, or its water mask is none.
     pub fn fault(&self) -> Option<&'static str> {
         let place = |v: u32| {
             let [u, v, _] = self.vertices[v as usize];
@@ -52,6 +56,9 @@ impl DecodedTile {
         }
         if sum != 2 * i64::from(LAST) * i64::from(LAST) {
             return Some("its triangles do not cover it");
+        }
+        if self.water.as_ref().is_some_and(|mask| !is_mask(mask)) {
+            return Some("its water mask is none");
         }
         (0..4).find_map(|side| self.fault_of_side(side))
     }
@@ -105,17 +112,19 @@ pub fn decode(bytes: &[u8]) -> Result<DecodedTile, NotATile> {
             return Err(NotATile::Vertex);
         }
     }
-    let mut normals = Vec::new();
+    let (mut normals, mut water) = (Vec::new(), None);
     while reader.at < bytes.len() {
         let kind = reader.take::<1>()?[0];
         let length = reader.count(1)?;
         let content = bytes.get(reader.at..reader.at + length).ok_or(NotATile::Short)?;
         reader.at += length;
-        if kind == NORMALS {
-            normals = content.as_chunks::<2>().0.to_vec();
+        match kind {
+            NORMALS => normals = content.as_chunks::<2>().0.to_vec(),
+            WATER_MASK => water = Some(content.to_vec()),
+            _ => {}
         }
     }
-    Ok(DecodedTile { heights, vertices, triangles, sides, normals })
+    Ok(DecodedTile { heights, vertices, triangles, sides, normals, water })
 }
 
 struct Reader<'a> {

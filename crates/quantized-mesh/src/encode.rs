@@ -1,10 +1,11 @@
-//! The bytes of a tile: quantized-mesh 1.0, with normals.
+//! The bytes of a tile: quantized-mesh 1.0, with normals and the water mask.
 
 use crate::header::{Header, circle};
 use crate::mesh::{LAST, Node, TileMesh};
 use crate::normals::{BorderNormal, normals};
 use crate::place::HEIGHT_STEPS;
 use crate::tile::Tile;
+use crate::water::Water;
 
 /// A step of heights that all tiles of a zoom can be written with: a power of two of the steps of [`Node`]s. Heights on borders are rounded to it, so that
 /// neighbours have the same.
@@ -40,10 +41,15 @@ pub struct Surface<'a> {
     pub outside: i32,
     /// What the tiles around it add to the normals on its border, by the columns east and the rows north that they lie.
     pub around: &'a [([i32; 2], Vec<BorderNormal>)],
+    /// Where the water of its zoom is, if tiles tell that.
+    pub water: Option<&'a Water>,
 }
 
 /// The number of the extension with normals.
 pub(crate) const NORMALS: u8 = 1;
+
+/// The number of the extension with the water mask.
+pub(crate) const WATER_MASK: u8 = 2;
 
 /// Returns the bytes of a tile.
 pub fn encode(surface: &Surface, steps: HeightSteps) -> Vec<u8> {
@@ -76,6 +82,11 @@ pub fn encode(surface: &Surface, steps: HeightSteps) -> Vec<u8> {
     let directions =
         order.vertices.iter().zip(&nodes).map(|(&v, node)| frame.earth_centred(*node, normals[v as usize]));
     bytes.extend(directions.map(octahedral).collect::<Vec<[u8; 2]>>().as_flattened());
+    if let Some(mask) = surface.water.map(|water| water.mask(tile)) {
+        bytes.push(WATER_MASK);
+        bytes.extend((mask.len() as u32).to_le_bytes());
+        bytes.extend(mask);
+    }
     bytes
 }
 
@@ -185,7 +196,7 @@ fn push_sides(bytes: &mut Vec<u8>, nodes: &[Node], is_long: bool) {
     }
 }
 
-/// Tiles from this zoom on are so small that directions are the same everywhere in them, as far as two bytes tell.
+/// Tiles from this zoom of the geographic scheme on are so small that directions are the same everywhere in them, as far as two bytes tell.
 const FIRST_SMALL_ZOOM: u8 = 12;
 
 /// East, north and up in a tile, in earth-centred axes.
@@ -197,16 +208,17 @@ struct EarthFrame {
 
 impl EarthFrame {
     fn new(tile: Tile) -> EarthFrame {
-        EarthFrame { tile, middle: tile.south_west().map(|low| circle(low + tile.side() / 2.0)) }
+        EarthFrame { tile, middle: tile.middle().map(circle) }
     }
 
     /// Returns about sine and cosine of longitude and latitude at a vertex.
     fn circles(&self, node: Node) -> [[f64; 2]; 2] {
-        if self.tile.zoom >= FIRST_SMALL_ZOOM {
+        if self.tile.geographic_zoom() >= FIRST_SMALL_ZOOM {
             return self.middle;
         }
-        let ([west, south], side) = (self.tile.south_west(), self.tile.side() / f64::from(LAST));
-        [circle(west + side * f64::from(node.u)), circle(south + side * f64::from(node.v))]
+        let [west, south] = self.tile.south_west();
+        let [east, north] = self.tile.sides().map(|side| side / f64::from(LAST));
+        [circle(west + east * f64::from(node.u)), circle(south + north * f64::from(node.v))]
     }
 
     /// Returns about the direction of a normal in earth-centred axes, of any length.

@@ -7,7 +7,7 @@ const SEMI_MAJOR: f64 = 6_378_137.0;
 /// Its lesser half axis.
 const SEMI_MINOR: f64 = 6_356_752.314_245_179;
 
-/// Tiles of smaller zooms are so wide that a few places do not stand for all.
+/// Tiles of smaller zooms of the geographic scheme are so wide that a few places do not stand for all.
 const FIRST_SMALL_ZOOM: u8 = 8;
 
 /// Where a tile is, in earth-centred metres.
@@ -23,19 +23,19 @@ pub(crate) struct Header {
 impl Header {
     /// Returns the header of a tile with heights between two in metres.
     pub(crate) fn new(tile: Tile, [low, high]: [f64; 2]) -> Header {
-        let parts = if tile.zoom < FIRST_SMALL_ZOOM { 32 } else { 2 };
-        let [west, south] = tile.south_west();
-        let share = |part: i32| tile.side() * f64::from(part) / f64::from(parts);
-        let places = || (0..=parts).flat_map(|i| (0..=parts).map(move |j| [west + share(i), south + share(j)]));
-        let middle = [west + tile.side() / 2.0, south + tile.side() / 2.0];
-        let centre = earth_centred(middle, (low + high) / 2.0);
+        let parts = if tile.geographic_zoom() < FIRST_SMALL_ZOOM { 32 } else { 2 };
+        let ([west, south], [width, height]) = (tile.south_west(), tile.sides());
+        let share = |side: f64, part: i32| side * f64::from(part) / f64::from(parts);
+        let place = |i: i32, j: i32| [west + share(width, i), south + share(height, j)];
+        let places = || (0..=parts).flat_map(|i| (0..=parts).map(move |j| place(i, j)));
+        let centre = earth_centred(tile.middle(), (low + high) / 2.0);
         let all = places().flat_map(|place| [low, high].map(|height| earth_centred(place, height)));
         let radius = all.map(|place| length(minus(place, centre))).fold(0.0, f64::max);
         let direction = scaled(centre);
         let direction = direction.map(|along| along / length(direction));
         let mut reach = places().map(|place| horizon_distance(scaled(earth_centred(place, high)), direction));
-        // A tile around which the horizon turns is never hidden by it.
-        const FAR: f64 = 10.0;
+        // The horizon hides no part of the globe's half or more. So far out, viewers do not find the point hidden, even behind the globe.
+        const FAR: f64 = 1e200;
         let reach = reach.try_fold(1.0, |most: f64, reach| Some(most.max(reach?))).unwrap_or(FAR);
         Header { centre, radius, horizon: direction.map(|along| along * reach) }
     }
@@ -85,4 +85,46 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 pub(crate) fn length([x, y, z]: [f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scheme::Scheme;
+    use proptest::prelude::*;
+
+    /// Tells whether the horizon hides a point from a camera, both in half axes of the ellipsoid, as viewers compute it.
+    fn is_hidden(point: [f64; 3], camera: [f64; 3]) -> bool {
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let (to_point, to_horizon) = (minus(point, camera), dot(camera, camera) - 1.0);
+        let behind = -dot(to_point, camera);
+        behind > to_horizon && behind * behind / dot(to_point, to_point) > to_horizon
+    }
+
+    proptest! {
+        /// What hides the point of the header hides all of the tile.
+        #[test]
+        fn no_tile_in_sight_is_hidden(
+            zoom in prop::sample::select(vec![0u8, 0, 0, 1, 2, 5, 8]),
+            [column, row] in [0.0..1.0f64, 0.0..1.0f64],
+            [longitude, latitude] in [-3.2..3.2f64, -1.5..1.5f64],
+            digits in 3.0..8.0f64,
+            is_geographic in any::<bool>(),
+        ) {
+            let scheme = if is_geographic { Scheme::Geographic } else { Scheme::WebMercator };
+            let number = |share: f64, count: i32| (share * f64::from(count)) as i32;
+            let tile = Tile { scheme, zoom, x: number(column, scheme.columns(zoom)), y: number(row, 1 << zoom) };
+            let camera = scaled(earth_centred([longitude, latitude], 10f64.powf(digits)));
+            if is_hidden(Header::new(tile, [-100.0, 3000.0]).horizon, camera) {
+                let ([west, south], [width, high]) = (tile.south_west(), tile.sides());
+                for i in 0..=32 {
+                    for j in 0..=32 {
+                        let share = [i, j].map(|part| f64::from(part) / 32.0);
+                        let place = earth_centred([west + width * share[0], south + high * share[1]], 3000.0);
+                        prop_assert!(is_hidden(scaled(place), camera), "{tile:?} {share:?}");
+                    }
+                }
+            }
+        }
+    }
 }

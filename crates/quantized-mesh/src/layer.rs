@@ -1,5 +1,6 @@
 //! `layer.json`: which tiles there are.
 
+use crate::scheme::Scheme;
 use crate::tile::Tile;
 use serde_json::{Value, json};
 
@@ -44,6 +45,10 @@ impl ZoomTiles {
 
 /// What the list tells of the terrain.
 pub struct LayerAbout<'a> {
+    /// The tiling scheme.
+    pub scheme: Scheme,
+    /// Whether tiles have a water mask.
+    pub has_water: bool,
     /// West, south, east and north of the terrain in degrees.
     pub bounds: [f64; 4],
     /// Whose the data are.
@@ -55,14 +60,15 @@ pub fn layer(zooms: &[ZoomTiles], about: &LayerAbout) -> String {
     let rectangle = |[[west, east], [south, north]]: [[i32; 2]; 2]| json!({ "startX": west, "startY": south, "endX": east, "endY": north });
     let available: Vec<Vec<Value>> =
         zooms.iter().map(|zoom| zoom.rectangles().into_iter().map(rectangle).collect()).collect();
+    let extensions = if about.has_water { &["octvertexnormals", "watermask"][..] } else { &["octvertexnormals"] };
     let mut list = json!({
         "tilejson": "2.1.0",
         "format": "quantized-mesh-1.0",
         "version": "1.0.0",
         "scheme": "tms",
-        "projection": "EPSG:4326",
+        "projection": about.scheme.projection(),
         "tiles": ["{z}/{x}/{y}.terrain"],
-        "extensions": ["octvertexnormals"],
+        "extensions": extensions,
         "bounds": about.bounds,
         "minzoom": 0,
         "maxzoom": zooms.len().saturating_sub(1),

@@ -22,8 +22,8 @@ pub struct BorderNormal {
 /// Returns for each vertex the sum of the normals of its triangles, east, north and up, each as long as twice the area of its triangle. Triangles
 /// beside the terrain add nothing.
 fn sums(mesh: &TileMesh, tile: Tile, triangles: impl Iterator<Item = [u32; 3]>) -> Vec<[f32; 3]> {
-    let step = tile.side() * RADIUS / SPAN as f64;
-    let [x, y, z] = [step * libm::cos(tile.middle_latitude()), step, 1.0 / HEIGHT_STEPS];
+    let [east, north] = tile.sides().map(|side| side * RADIUS / SPAN as f64);
+    let [x, y, z] = [east * libm::cos(tile.middle()[1]), north, 1.0 / HEIGHT_STEPS];
     // In steps first, then in square metres.
     let scale = [y * z, z * x, x * y];
     let mut sums = vec![[0.0f64; 3]; mesh.nodes.len()];

@@ -2,11 +2,12 @@
 
 use crate::bound::steps;
 use crate::mesh::Node;
+use crate::tile::Tile;
 
-/// Selects vertices of a side, given in order with their steps along it, so that all are within the bound of the zoom of the
+/// Selects vertices of a side, given in order with their steps along it, so that all are within the bound of the zoom of a tile of the
 /// lines between them (Ramer 1972; Douglas and Peucker 1973, with vertical distances). The first and the last are selected. The result depends on the
 /// side alone, so it is the same in both tiles beside it.
-pub(crate) fn selected_along(side: &[(u16, Node)], zoom: u8, outside: i32) -> Vec<(u16, Node)> {
+pub(crate) fn selected_along(side: &[(u16, Node)], tile: Tile, outside: i32) -> Vec<(u16, Node)> {
     let line: Vec<[i128; 2]> =
         side.iter().map(|(along, node)| [(*along).into(), node.height(outside).into()]).collect();
     let mut is_selected = vec![false; side.len()];
@@ -17,7 +18,7 @@ pub(crate) fn selected_along(side: &[(u16, Node)], zoom: u8, outside: i32) -> Ve
         ranges.push((0, last));
     }
     while let Some((first, last)) = ranges.pop() {
-        if let Some(worst) = worst_between(&line, [first, last], steps(zoom)) {
+        if let Some(worst) = worst_between(&line, [first, last], steps(tile.scheme, tile.zoom)) {
             is_selected[worst] = true;
             ranges.extend([(first, worst), (worst, last)]);
         }

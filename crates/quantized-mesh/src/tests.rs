@@ -10,6 +10,7 @@ struct Terrain {
     triangles: Vec<[u32; 3]>,
 }
 
+const SCHEME: Scheme = Scheme::Geographic;
 const ZOOM: u8 = 12;
 const CORNER: [i32; 2] = [4000, 3000];
 
@@ -127,6 +128,15 @@ fn height_over(mesh: &TileMesh, [u, v]: [f64; 2]) -> Option<f64> {
     mesh.triangles.iter().filter_map(over).reduce(f64::max)
 }
 
+/// Returns where a vertex of a tile lies in the tile above, by its longitude and latitude.
+fn in_parent(tile: Tile, steps: [u16; 2]) -> [f64; 2] {
+    let parent = tile.parent();
+    [0, 1].map(|axis: usize| {
+        let place = tile.south_west()[axis] + tile.sides()[axis] * f64::from(steps[axis]) / f64::from(LAST);
+        (place - parent.south_west()[axis]) / parent.sides()[axis] * f64::from(LAST)
+    })
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
 
@@ -172,7 +182,12 @@ proptest! {
     }
 
     #[test]
-    fn coarser_tiles_meet_and_keep_the_bound(seed in 0u64..1 << 40, count in 1usize..600, reach in 20_000i64..70_000) {
+    fn coarser_tiles_meet_and_keep_the_bound(
+        seed in 0u64..1 << 40,
+        count in 1usize..600,
+        reach in 20_000i64..70_000,
+        scheme in prop::sample::select(vec![Scheme::Geographic, Scheme::WebMercator]),
+    ) {
         // Slopes are at most this steep, in steps of height for a step along.
         const SPACING: i64 = 4_000;
         const STEEPEST: f64 = 2.0 * 3_000_000.0 / SPACING as f64;
@@ -186,19 +201,20 @@ proptest! {
                 children.entry([x >> 1, y >> 1]).or_default().push(child);
             }
             let make = |(place, children): (&[i32; 2], &Vec<Child>)| {
-                let (mesh, bound) = coarser(Tile { zoom, x: place[0], y: place[1] }, children, 0).unwrap();
+                let (mesh, bound) = coarser(Tile { scheme, zoom, x: place[0], y: place[1] }, children, 0).unwrap();
                 (*place, mesh, bound)
             };
             let made: Vec<_> = children.iter().map(make).collect();
             let bound = made.iter().map(|(_, _, bound)| *bound).max().unwrap();
-            prop_assert!(bound as f64 <= LEVEL_ZERO_ERROR * HEIGHT_STEPS / 4.0 / f64::from(1 << zoom));
+            let expected = LEVEL_ZERO_ERROR * f64::from(2 / scheme.columns(0));
+            prop_assert!(bound as f64 <= expected * HEIGHT_STEPS / 4.0 / f64::from(1 << zoom));
             // A vertex moves by a step of the coarser zoom along each axis, at most.
             let most = bound as f64 + STEEPEST * 4.0 * f64::from(1 << (ZOOM - zoom));
             let coarse: BTreeMap<[i32; 2], TileMesh> = made.into_iter().map(|(place, mesh, _)| (place, mesh)).collect();
             for ([x, y], mesh) in &finer {
+                let tile = Tile { scheme, zoom: zoom + 1, x: *x, y: *y };
                 for node in &mesh.nodes {
-                    let along = |axis: i32, steps: u16| (f64::from(axis & 1) * f64::from(LAST) + f64::from(steps)) / 2.0;
-                    let place = [along(*x, node.u), along(*y, node.v)];
+                    let place = in_parent(tile, [node.u, node.v]);
                     let Some(found) = height_over(&coarse[&[x >> 1, y >> 1]], place) else { continue };
                     let off = (found - f64::from(node.height(0))).abs();
                     prop_assert!(off <= most, "{off} {most}");
@@ -216,6 +232,7 @@ proptest! {
         seed in 0u64..1 << 40,
         count in 1usize..300,
         reach in prop::sample::select(vec![3i64, 20, 2_000, 40_000]),
+        scheme in prop::sample::select(vec![Scheme::Geographic, Scheme::WebMercator]),
     ) {
         let mut finer = tiles(&terrain_with_pairs(seed, count, reach, 1, 4), 1);
         for zoom in (ZOOM - 3..ZOOM).rev() {
@@ -225,7 +242,7 @@ proptest! {
                 children.entry([x >> 1, y >> 1]).or_default().push(child);
             }
             let make = |([x, y], children): ([i32; 2], Vec<Child>)| {
-                ([x, y], coarser(Tile { zoom, x, y }, &children, 0).unwrap().0)
+                ([x, y], coarser(Tile { scheme, zoom, x, y }, &children, 0).unwrap().0)
             };
             finer = children.into_iter().map(make).collect();
             finer.values().for_each(check_whole);
@@ -239,7 +256,7 @@ proptest! {
         terrain.points.iter_mut().for_each(|point| point.z = (i64::from(point.z) * range / 200_000) as i32 - 5_000);
         let steps = HeightSteps::over(2 * range as u64 + 20_000);
         for ([x, y], mesh) in tiles(&terrain, 1) {
-            let surface = Surface { tile: Tile { zoom: ZOOM, x, y }, mesh: &mesh, outside: 3, around: &[] };
+            let surface = Surface { tile: Tile { scheme: SCHEME, zoom: ZOOM, x, y }, mesh: &mesh, outside: 3, around: &[], water: None };
             let bytes = encode(&surface, steps);
             let tile = decode(&bytes).unwrap();
             prop_assert_eq!(tile.vertices.len(), mesh.nodes.len());
@@ -277,7 +294,7 @@ proptest! {
     fn broken_tiles_are_refused(seed in 0u64..1 << 40, changes in 1usize..20) {
         let terrain = terrain(seed, 30, 50_000, 1);
         let (place, mesh) = tiles(&terrain, 1).pop_first().unwrap();
-        let surface = Surface { tile: Tile { zoom: ZOOM, x: place[0], y: place[1] }, mesh: &mesh, outside: 0, around: &[] };
+        let surface = Surface { tile: Tile { scheme: SCHEME, zoom: ZOOM, x: place[0], y: place[1] }, mesh: &mesh, outside: 0, around: &[], water: None };
         let mut bytes = encode(&surface, HeightSteps::over(300_000));
         let mut next = random(seed);
         for _ in 0..changes {
@@ -294,7 +311,13 @@ proptest! {
 #[test]
 fn faults_of_a_mesh_are_found() {
     let (place, mesh) = tiles(&terrain(8, 60, 50_000, 1), 1).pop_first().unwrap();
-    let surface = Surface { tile: Tile { zoom: ZOOM, x: place[0], y: place[1] }, mesh: &mesh, outside: 0, around: &[] };
+    let surface = Surface {
+        tile: Tile { scheme: SCHEME, zoom: ZOOM, x: place[0], y: place[1] },
+        mesh: &mesh,
+        outside: 0,
+        around: &[],
+        water: None,
+    };
     let tile = decode(&encode(&surface, HeightSteps::over(300_000))).unwrap();
     let faults = [
         |tile: &mut DecodedTile| tile.triangles[0].swap(0, 1),
@@ -331,7 +354,7 @@ fn all_that_the_finest_tiles_have_is_on_the_triangulation() {
 fn neighbours_have_the_same_normals() {
     let terrain = terrain(9, 300, 60_000, 1);
     let meshes = tiles(&terrain, 1);
-    let tile = |[x, y]: [i32; 2]| Tile { zoom: ZOOM, x, y };
+    let tile = |[x, y]: [i32; 2]| Tile { scheme: SCHEME, zoom: ZOOM, x, y };
     let normals_of = |place: [i32; 2]| {
         let others = (-1..=1).flat_map(|y| (-1..=1).map(move |x| [x, y])).filter(|offset| *offset != [0, 0]);
         let around: Vec<([i32; 2], Vec<BorderNormal>)> = others
@@ -353,19 +376,21 @@ fn neighbours_have_the_same_normals() {
 #[test]
 fn a_tile_beside_the_terrain_follows_the_curve_of_the_earth() {
     check_whole(&TileMesh::surroundings());
-    let mesh = flat(Tile { zoom: 0, x: 1, y: 0 }).unwrap();
-    check_whole(&mesh);
-    assert_eq!(mesh.nodes.len(), 33 * 33);
-    assert!(mesh.nodes.iter().all(|node| node.h == OUTSIDE));
+    for scheme in [Scheme::Geographic, Scheme::WebMercator] {
+        let mesh = flat(Tile { scheme, zoom: 0, x: 0, y: 0 }).unwrap();
+        check_whole(&mesh);
+        assert_eq!(mesh.nodes.len(), 33 * 33);
+        assert!(mesh.nodes.iter().all(|node| node.h == OUTSIDE));
+    }
 }
 
 /// Far from the terrain, both halves of the globe have the same vertices between them, close enough for its curve.
 #[test]
 fn the_halves_of_the_globe_meet() {
     let leaf = Child { quadrant: [1, 1], nodes: tiles(&terrain(3, 40, 9_000, 1), 1).pop_first().unwrap().1.nodes };
-    let (east, _) = coarser(Tile { zoom: 0, x: 1, y: 0 }, &[leaf], 0).unwrap();
+    let (east, _) = coarser(Tile { scheme: SCHEME, zoom: 0, x: 1, y: 0 }, &[leaf], 0).unwrap();
     check_whole(&east);
-    let west = flat(Tile { zoom: 0, x: 0, y: 0 }).unwrap();
+    let west = flat(Tile { scheme: SCHEME, zoom: 0, x: 0, y: 0 }).unwrap();
     assert_eq!(side(&east, 0), side(&west, 1));
     assert!(side(&west, 1).len() == 33);
 }
@@ -373,8 +398,9 @@ fn the_halves_of_the_globe_meet() {
 #[test]
 fn the_list_names_each_tile_once() {
     let mut next = random(3);
-    let tiles: Vec<Tile> = (0..200).map(|_| Tile { zoom: 5, x: next(20) as i32 - 10, y: next(12) as i32 }).collect();
-    let about = LayerAbout { bounds: [0.0; 4], attribution: Some("(c) Example") };
+    let tiles: Vec<Tile> =
+        (0..200).map(|_| Tile { scheme: SCHEME, zoom: 5, x: next(20) as i32 - 10, y: next(12) as i32 }).collect();
+    let about = LayerAbout { scheme: SCHEME, has_water: false, bounds: [0.0; 4], attribution: Some("(c) Example") };
     let text = layer(&[ZoomTiles::new(&tiles)], &about);
     let list: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(list["attribution"], "(c) Example");
@@ -393,9 +419,161 @@ fn the_list_names_each_tile_once() {
 #[test]
 fn the_finest_zoom_follows_the_density() {
     // Four points a square metre: tiles of 76 m have 23,000 of them, those of 38 m 6,000.
-    assert_eq!(finest_zoom(1e6, 4_000_000, 0.0), 19);
-    assert_eq!(finest_zoom(1e6, 2_000_000, 0.0), 18);
-    assert_eq!(finest_zoom(1e6, 2_000_000, 1.2), 18);
-    assert_eq!(finest_zoom(0.0, 0, 0.0), MOST_ZOOM);
-    assert_eq!(finest_zoom(1e12, 3, 0.0), 10);
+    assert_eq!(finest_zoom(SCHEME, 1e6, 4_000_000, 0.0), 19);
+    assert_eq!(finest_zoom(SCHEME, 1e6, 2_000_000, 0.0), 18);
+    assert_eq!(finest_zoom(SCHEME, 1e6, 2_000_000, 1.2), 18);
+    assert_eq!(finest_zoom(SCHEME, 0.0, 0, 0.0), 20);
+    assert_eq!(finest_zoom(SCHEME, 1e12, 3, 0.0), 10);
+    // Tiles of web mercator are as wide one zoom later, and far from the equator they are lower.
+    assert_eq!([0.0, 1.2].map(|latitude| finest_zoom(Scheme::WebMercator, 1e6, 2_000_000, latitude)), [19, 18]);
+    assert_eq!([(0.0, 0), (1e12, 3)].map(|(area, count)| finest_zoom(Scheme::WebMercator, area, count, 0.0)), [21, 11]);
+}
+
+/// Within a row, steps are linear in latitude, so that both tiles beside a border have the same vertices there.
+#[test]
+fn rows_of_web_mercator_are_linear_in_latitude() {
+    for zoom in [0, 1, 11, 18, 21] {
+        let mut grid = TileGrid::new(Scheme::WebMercator, zoom);
+        let rows = 1i32 << zoom;
+        for row in [0, rows / 3, rows / 2, rows - 1] {
+            let [south, north] = [row, row + 1].map(|row| Scheme::WebMercator.latitude(zoom, row));
+            // Radians of latitude are doubles, a step of which is 1e-16.
+            let least = (2e-16 / (north - south) * SPAN as f64).max(1e-6);
+            for part in 0..64 {
+                let latitude = south + (north - south) * f64::from(part) / 64.0;
+                let exact = f64::from(row) * SPAN as f64 + f64::from(part) * SPAN as f64 / 64.0;
+                let found = grid.nearest([0.0, latitude], 0.0).unwrap();
+                assert!((found.y as f64 - exact).abs() <= 0.5 + least, "{zoom} {row} {part}");
+                assert_eq!(found.x, ((SPAN << zoom) + 1) / 2);
+            }
+            let on_border = grid.nearest([0.0, north], 0.0).unwrap();
+            assert_eq!(on_border.y, i64::from(row + 1) * SPAN);
+        }
+    }
+}
+
+/// In web mercator an edge across rows is straight in each of them, with a kink at their border. That is a fifth of a step at most for an edge
+/// as long as vertices are apart on average, and 26 steps for one as long as a tile of the coarsest zoom that has all triangles.
+#[test]
+fn edges_across_rows_are_nearly_straight() {
+    let mut most = [0.0f64; 2];
+    for zoom in 11..=21 {
+        let rows = 1i32 << zoom;
+        for row in (1..rows).step_by((rows / 64) as usize) {
+            let [low, middle, high] = [row - 1, row, row + 1].map(|row| Scheme::WebMercator.latitude(zoom, row));
+            // An edge from below the border to above it, half a length on each side in steps; its middle in latitude.
+            for (k, length) in [1.0 / 128.0, 1.0].into_iter().enumerate() {
+                let [south, north] = [middle - (middle - low) * length / 2.0, middle + (high - middle) * length / 2.0];
+                // Along the edge, at the border: half the steps, and this share of the latitudes.
+                let share = (middle - south) / (north - south);
+                most[k] = most[k].max((share - 0.5).abs() * length * SPAN as f64);
+            }
+        }
+    }
+    assert!(most[0] < 0.2 && most[1] < 26.0, "{most:?}");
+}
+
+/// A terrain across the 180th meridian lies in both halves of the one tile of zoom 0.
+#[test]
+fn the_tile_around_the_globe_is_one() {
+    let tile = |zoom: u8, x: i32| Tile { scheme: Scheme::WebMercator, zoom, x, y: 0 };
+    assert_eq!([1, 2, -1].map(|x| tile(1, x).parent()), [tile(0, 0); 3]);
+    assert_eq!([1, 2, -1].map(|x| tile(1, x).column()), [1, 0, 1]);
+    assert_eq!(tile(0, 0).beside([1, 0]), tile(0, 0));
+    assert_eq!(tile(2, 3).beside([1, 0]), tile(2, 4));
+}
+
+/// Rings of lakes on the grid of a zoom, around the corner of four tiles.
+fn lakes(seed: u64, count: u32, reach: i64) -> Vec<Shore> {
+    let mut next = random(seed);
+    let mut shores = Vec::new();
+    for lake in 0..count {
+        let middle = CORNER.map(|number| i64::from(number) * SPAN + next(2 * reach) - reach);
+        // Rings may cross themselves.
+        let ring: Vec<[i64; 2]> =
+            (0..next(9) + 3).map(|_| middle.map(|along| along + next(reach) - reach / 2)).collect();
+        let ends = ring.iter().zip(ring.iter().cycle().skip(1)).map(|(from, to)| [*from, *to]);
+        shores.extend(ends.map(|ends| Shore { lake, ends }));
+    }
+    shores
+}
+
+/// Tells whether a place is in a lake: x and y in parts of a step, by the crossings of a line to the east with each shore.
+fn is_in_lake(shores: &[Shore], [x, y]: [i64; 2], parts: i64) -> bool {
+    let is_crossed = |shore: &&Shore| {
+        let [[ax, ay], [bx, by]] = shore.ends.map(|end| end.map(|along| i128::from(along * parts)));
+        let (x, y) = (i128::from(x), i128::from(y));
+        // A middle on the shore is in the lake that lies east of it.
+        (ay <= y) != (by <= y) && {
+            let side = (bx - ax) * (y - ay) - (by - ay) * (x - ax);
+            if by > ay { side > 0 } else { side < 0 }
+        }
+    };
+    let lakes = shores.chunk_by(|a, b| a.lake == b.lake);
+    lakes.map(|shores| shores.iter().filter(is_crossed).count()).any(|count| count % 2 == 1)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_water_mask_is_where_middles_of_cells_are_in_lakes(
+        seed in 0u64..1 << 40,
+        count in 1u32..6,
+        reach in prop::sample::select(vec![100i64, 3_000, 60_000, 300_000]),
+        scheme in prop::sample::select(vec![Scheme::Geographic, Scheme::WebMercator]),
+        coarser in 0u8..4,
+    ) {
+        let mut shores = lakes(seed, count, reach);
+        let zoom = ZOOM - coarser;
+        let of_one_order = Water::new(scheme, [zoom, ZOOM], &shores);
+        let corner = CORNER.map(|number| number >> coarser);
+        for [east, north] in [[-1, -1], [0, -1], [-1, 0], [0, 0]] {
+            let tile = Tile { scheme, zoom, x: corner[0] + east, y: corner[1] + north };
+            let mask = of_one_order.mask(tile);
+            prop_assert!(mask.len() == 1 || mask.len() == 1 << 16);
+            let mut random_cells = random(seed);
+            for _ in 0..200 {
+                let [column, row] = [random_cells(256), random_cells(256)];
+                let found = mask.get((255 - row) as usize * 256 + column as usize).unwrap_or(&mask[0]);
+                let x = (2 * (i64::from(tile.x) * 256 + column) + 1) * (SPAN << coarser);
+                let [south, north] = [tile.y, tile.y + 1].map(|row| scheme.latitude(zoom, row));
+                let latitude = south + (north - south) * ((2 * row + 1) as f64 / 512.0);
+                let y = TileGrid::new(scheme, ZOOM).y(latitude, 512);
+                prop_assert_eq!(*found == 255, is_in_lake(&shores, [x, y], 512), "{} {}", column, row);
+            }
+        }
+        // Neither the order of edges matters, nor their directions.
+        shores.reverse();
+        shores.iter_mut().for_each(|shore| shore.ends.reverse());
+        let of_another = Water::new(scheme, [zoom, ZOOM], &shores);
+        let tile = Tile { scheme, zoom, x: corner[0], y: corner[1] };
+        prop_assert_eq!(of_one_order.mask(tile), of_another.mask(tile));
+    }
+}
+
+#[test]
+fn tiles_in_a_lake_and_beside_it_have_one_number() {
+    let [west, south] = CORNER.map(|number| i64::from(number) * SPAN);
+    let ring = [[west, south], [west + 2 * SPAN, south], [west + 2 * SPAN, south + SPAN], [west, south + SPAN]];
+    let shores: Vec<Shore> = (0..4).map(|k| Shore { lake: 0, ends: [ring[k], ring[(k + 1) % 4]] }).collect();
+    let water = Water::new(SCHEME, [ZOOM; 2], &shores);
+    let mask = |x: i32, y: i32| water.mask(Tile { scheme: SCHEME, zoom: ZOOM, x: CORNER[0] + x, y: CORNER[1] + y });
+    assert_eq!(
+        [mask(0, 0), mask(1, 0), mask(2, 0), mask(0, 1), mask(-1, 0)],
+        [[255], [255], [0], [0], [0]].map(Vec::from)
+    );
+    let coarser = Water::new(SCHEME, [ZOOM - 1, ZOOM], &shores);
+    let mask = coarser.mask(Tile { scheme: SCHEME, zoom: ZOOM - 1, x: CORNER[0] >> 1, y: CORNER[1] >> 1 });
+    // The southern half of the tile: the last rows.
+    assert!(mask[..1 << 15].iter().all(|cell| *cell == 0) && mask[1 << 15..].iter().all(|cell| *cell == 255));
+    // The tile around the globe has water beyond the 180th meridian in its west. A sixteenth of it is sixteen columns.
+    let zoom = 4;
+    let ends = |[x, y]: [i64; 2]| [(x - west) / SPAN * SPAN + 15 * SPAN, (y - south) / SPAN * SPAN + 8 * SPAN];
+    let shores: Vec<Shore> = shores.iter().map(|shore| Shore { lake: 0, ends: shore.ends.map(ends) }).collect();
+    let all = Water::new(Scheme::WebMercator, [0, zoom], &shores);
+    let root = all.mask(Tile { scheme: Scheme::WebMercator, zoom: 0, x: 0, y: 0 });
+    let row = root.as_chunks::<256>().0.iter().find(|row| row[0] == 255).unwrap();
+    let columns: Vec<usize> = (0..256).filter(|&column| row[column] == 255).collect();
+    assert_eq!(columns, (0..16).chain(240..256).collect::<Vec<usize>>());
 }

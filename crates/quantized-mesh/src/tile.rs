@@ -1,10 +1,13 @@
-//! The tiles of a zoom: two at zoom 0, each half of the globe, and four for each at the next.
+//! The tiles of a zoom: one or two at zoom 0, and four for each at the next.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use crate::scheme::Scheme;
+use std::f64::consts::PI;
 
 /// A tile. Rows are counted from the south, as in a tile map service (TMS).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Tile {
+    /// The tiling scheme.
+    pub scheme: Scheme,
     /// Its zoom.
     pub zoom: u8,
     /// The number of its row, from the south.
@@ -16,31 +19,49 @@ pub struct Tile {
 impl Tile {
     /// Returns the tile that holds this one at the zoom before. There must be one.
     pub fn parent(self) -> Tile {
-        Tile { zoom: self.zoom.saturating_sub(1), x: self.x >> 1, y: self.y >> 1 }
+        Tile { zoom: self.zoom.saturating_sub(1), x: self.x >> 1, y: self.y >> 1, ..self }.once()
     }
 
     /// Returns the number of its column in file names: from 0 on, without a turn too many.
     pub fn column(self) -> i32 {
-        self.x.rem_euclid(2 << self.zoom)
+        self.x.rem_euclid(self.scheme.columns(self.zoom))
     }
 
     /// Returns the tile beside it, so many columns east and rows north.
     pub fn beside(self, [east, north]: [i32; 2]) -> Tile {
-        Tile { x: self.x.saturating_add(east), y: self.y.saturating_add(north), ..self }
+        Tile { x: self.x.saturating_add(east), y: self.y.saturating_add(north), ..self }.once()
     }
 
-    /// Returns its side in radians.
-    pub(crate) fn side(self) -> f64 {
-        PI / f64::from(1u32 << self.zoom)
+    /// A tile around the globe is beside itself, and has one number.
+    fn once(self) -> Tile {
+        if self.scheme.columns(self.zoom) == 1 { Tile { x: 0, ..self } } else { self }
+    }
+
+    /// Returns the zoom at which tiles of the geographic scheme are as wide.
+    pub(crate) fn geographic_zoom(self) -> u8 {
+        self.zoom.saturating_sub(self.scheme.delay())
+    }
+
+    /// Returns its width and its height in radians.
+    pub(crate) fn sides(self) -> [f64; 2] {
+        let width = PI * f64::from(1u32 << self.scheme.delay()) / f64::from(1u32 << self.zoom);
+        match self.scheme {
+            Scheme::Geographic => [width; 2],
+            Scheme::WebMercator => {
+                let [south, north] = [self.y, self.y + 1].map(|row| self.scheme.latitude(self.zoom, row));
+                [width, north - south]
+            }
+        }
     }
 
     /// Returns longitude and latitude of its south-west corner in radians.
     pub(crate) fn south_west(self) -> [f64; 2] {
-        [f64::from(self.x) * self.side() - PI, f64::from(self.y) * self.side() - FRAC_PI_2]
+        [f64::from(self.x) * self.sides()[0] - PI, self.scheme.latitude(self.zoom, self.y)]
     }
 
-    /// Returns the latitude of its middle in radians.
-    pub(crate) fn middle_latitude(self) -> f64 {
-        self.south_west()[1] + self.side() / 2.0
+    /// Returns longitude and latitude of its middle in radians.
+    pub(crate) fn middle(self) -> [f64; 2] {
+        let ([west, south], [width, height]) = (self.south_west(), self.sides());
+        [west + width / 2.0, south + height / 2.0]
     }
 }

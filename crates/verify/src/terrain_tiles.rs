@@ -1,5 +1,5 @@
-//! Looks into the terrain tiles for globes: whether all that `layer.json` lists are there and can be read, whether each covers its place once, and
-//! whether neighbours have the same vertices between them, at the same heights to the last bit.
+//! Looks into the terrain tiles for globes: whether all that `layer.json` lists are there and can be read, whether each covers its place once and has
+//! a water mask if that is listed, and whether neighbours have the same vertices between them, at the same heights to the last bit.
 //!
 //! The tiles of a zoom are read row by row, and of a row only checksums of its sides stay. So it takes little memory, however many there are.
 
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Deserialize;
 use xxhash_rust::xxh3::xxh3_128;
 
-use quantized_mesh::{DecodedTile, decode};
+use quantized_mesh::{DecodedTile, Scheme, decode};
 use sys::{Error, Result, disk, interrupt};
 use tiles::checksums::read_file;
 use tiles::file_names::OutputFiles;
@@ -38,7 +38,15 @@ pub(super) struct TerrainTiles {
 
 #[derive(Deserialize)]
 struct Layer {
+    projection: String,
+    extensions: Vec<String>,
     available: Vec<Vec<Rectangle>>,
+}
+
+impl Layer {
+    fn scheme(&self) -> Option<Scheme> {
+        [Scheme::Geographic, Scheme::WebMercator].into_iter().find(|scheme| scheme.projection() == self.projection)
+    }
 }
 
 /// Columns and rows of tiles, first and last.
@@ -52,6 +60,16 @@ struct Rectangle {
     south: i32,
     #[serde(rename = "endY")]
     north: i32,
+}
+
+/// What all tiles have in common.
+struct TileFiles<'a> {
+    output: &'a OutputFiles,
+    scheme: Scheme,
+    /// Whether each has a water mask.
+    have_water: bool,
+    /// The most bytes that one may take unpacked.
+    most: usize,
 }
 
 /// A checksum of the vertices of each side of a tile: west, south, east, north.
@@ -73,10 +91,13 @@ impl TerrainTiles {
         let most = usize::try_from((memory / 4 / threads).max(LEAST_UNPACKED)).unwrap_or(usize::MAX);
         let mut found = TerrainTiles::default();
         match serde_json::from_slice::<Layer>(&text) {
-            Ok(Layer { available }) if is_possible(&available) => {
+            Ok(layer) if layer.scheme().is_some_and(|scheme| is_possible(scheme, &layer.available)) => {
+                let scheme = layer.scheme().unwrap_or_default();
+                let have_water = layer.extensions.iter().any(|name| name == "watermask");
+                let files = TileFiles { output: &output, scheme, have_water, most };
                 let mut listed = 0;
-                for (zoom, rectangles) in (0u8..).zip(available) {
-                    listed += found.check_zoom(&output, zoom, rectangles, most)?;
+                for (zoom, rectangles) in (0u8..).zip(layer.available) {
+                    listed += found.check_zoom(&files, zoom, rectangles)?;
                 }
                 found.compare_count(&output, listed)?;
             }
@@ -93,14 +114,14 @@ impl TerrainTiles {
     }
 
     /// Checks the tiles of a zoom, and returns how many are listed.
-    fn check_zoom(&mut self, output: &OutputFiles, zoom: u8, rectangles: Vec<Rectangle>, most: usize) -> Result<u64> {
+    fn check_zoom(&mut self, files: &TileFiles, zoom: u8, rectangles: Vec<Rectangle>) -> Result<u64> {
         let mut listed = 0;
         let mut below: (i32, BTreeMap<i32, Sides>) = (-1, BTreeMap::new());
         for (row, columns) in rows(rectangles) {
             listed += columns.len() as u64;
             let read = columns.par_iter().map(|&column| {
                 interrupt::check()?;
-                Ok((column, sides_of(output, zoom, [column, row], most)?))
+                Ok((column, sides_of(files, zoom, [column, row])?))
             });
             let mut sides: BTreeMap<i32, Sides> = BTreeMap::new();
             for (column, of_tile) in read.collect::<Result<Vec<_>>>()? {
@@ -112,7 +133,7 @@ impl TerrainTiles {
             self.tiles += sides.len() as u64;
             for (&column, own) in &sides {
                 // The last column is beside the first.
-                let east = (column + 1) % (2 << zoom);
+                let east = (column + 1) % files.scheme.columns(zoom);
                 if sides.get(&east).is_some_and(|other| own[2] != other[0]) {
                     self.fail(apart(zoom, [column, row], [east, row]));
                 }
@@ -151,13 +172,13 @@ impl TerrainTiles {
 }
 
 /// Tells whether all rectangles lie within their zooms.
-fn is_possible(available: &[Vec<Rectangle>]) -> bool {
+fn is_possible(scheme: Scheme, available: &[Vec<Rectangle>]) -> bool {
     let is_in = |low: i32, high: i32, count: i64| 0 <= low && low <= high && i64::from(high) < count;
-    let fits = |(zoom, rectangles): (usize, &Vec<Rectangle>)| {
-        let rows = 1i64 << zoom;
-        rectangles.iter().all(|all| is_in(all.west, all.east, 2 * rows) && is_in(all.south, all.north, rows))
+    let fits = |(zoom, rectangles): (u8, &Vec<Rectangle>)| {
+        let [columns, rows] = [scheme.columns(zoom).into(), 1i64 << zoom];
+        rectangles.iter().all(|all| is_in(all.west, all.east, columns) && is_in(all.south, all.north, rows))
     };
-    available.len() < MOST_ZOOM && available.iter().enumerate().all(fits)
+    available.len() < MOST_ZOOM && (0..).zip(available).all(fits)
 }
 
 /// Returns the rows of rectangles from the south, each with its columns from the west.
@@ -189,12 +210,8 @@ fn apart(zoom: u8, one: [i32; 2], other: [i32; 2]) -> String {
 }
 
 /// Reads a tile, and returns the checksums of its sides, or what is wrong with it.
-fn sides_of(
-    output: &OutputFiles,
-    zoom: u8,
-    place: [i32; 2],
-    most: usize,
-) -> Result<std::result::Result<Sides, String>> {
+fn sides_of(files: &TileFiles, zoom: u8, place: [i32; 2]) -> Result<std::result::Result<Sides, String>> {
+    let TileFiles { output, have_water, most, .. } = *files;
     let path = output.terrain_tile(zoom, place);
     let packed = match read_file(&path) {
         Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
@@ -208,6 +225,7 @@ fn sides_of(
     Ok(match decode(&bytes) {
         Ok(tile) => match tile.fault() {
             Some(what) => Err(format!("is no terrain tile: {what}")),
+            None if have_water && tile.water.is_none() => Err("has no water mask, and layer.json lists that".into()),
             None => Ok(checksums(&tile)),
         },
         Err(what) => Err(format!("is no terrain tile: {what}")),
@@ -230,34 +248,36 @@ fn checksums(tile: &DecodedTile) -> Sides {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use quantized_mesh::{HeightSteps, LayerAbout, Node, Surface, Tile, TileMesh, ZoomTiles, encode, layer};
+    use quantized_mesh::{HeightSteps, LayerAbout, Node, Surface, Tile, TileMesh, Water, ZoomTiles, encode, layer};
     use std::collections::BTreeSet;
     use std::fs;
     use tiles::gzip::gzipped_mesh;
 
+    const SCHEME: Scheme = Scheme::WebMercator;
+
     /// A tile with two triangles whose corners have these heights.
-    fn tile(tile: Tile, heights: [i32; 4]) -> Vec<u8> {
+    fn tile(tile: Tile, heights: [i32; 4], water: Option<&Water>) -> Vec<u8> {
         let mut mesh = TileMesh::surroundings();
         mesh.nodes.iter_mut().zip(heights).for_each(|(node, h)| *node = Node { h, ..*node });
-        let surface = Surface { tile, mesh: &mesh, outside: 0, around: &[] };
+        let surface = Surface { tile, mesh: &mesh, outside: 0, around: &[], water };
         gzipped_mesh(&encode(&surface, HeightSteps::over(5_000)))
     }
 
-    /// Writes 3 x 2 tiles of zoom 3 on one slope, and the list of them.
+    /// Writes 3 x 2 tiles of zoom 3 on one slope, with water masks, and the list of them.
     fn written(folder: &Path) -> OutputFiles {
         let output = OutputFiles::new(folder);
         let height = |x: i32, y: i32| x * 300 + y * 70;
-        let places: Vec<Tile> = (0..6).map(|i| Tile { zoom: 3, x: 5 + i % 3, y: 2 + i / 3 }).collect();
+        let places: Vec<Tile> = (0..6).map(|i| Tile { scheme: SCHEME, zoom: 3, x: 5 + i % 3, y: 2 + i / 3 }).collect();
         for place in &places {
             let path = output.terrain_tile(3, [place.x, place.y]);
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             let [x, y] = [place.x, place.y];
             let heights = [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]].map(|[x, y]| height(x, y));
-            fs::write(path, tile(*place, heights)).unwrap();
+            fs::write(path, tile(*place, heights, Some(&Water::default()))).unwrap();
         }
         let none = || ZoomTiles::new(&[]);
         let zooms = [none(), none(), none(), ZoomTiles::new(&places)];
-        let about = LayerAbout { bounds: [0.0; 4], attribution: None };
+        let about = LayerAbout { scheme: SCHEME, has_water: true, bounds: [0.0; 4], attribution: None };
         fs::write(output.terrain_layer(), layer(&zooms, &about)).unwrap();
         output
     }
@@ -282,12 +302,16 @@ mod tests {
         let one = output.terrain_tile(3, [6, 3]);
         let bytes = fs::read(&one).unwrap();
         // One corner is higher than those of three neighbours there, one of which lies across.
-        fs::write(&one, tile(Tile { zoom: 3, x: 6, y: 3 }, [6 * 300 + 3 * 70 + 40, 2310, 2080, 2380])).unwrap();
+        let place = Tile { scheme: SCHEME, zoom: 3, x: 6, y: 3 };
+        let higher = [6 * 300 + 3 * 70 + 40, 2310, 2080, 2380];
+        fs::write(&one, tile(place, higher, Some(&Water::default()))).unwrap();
         assert_fails(
             folder.path(),
             6,
             &["terrain/3/5/3.terrain and terrain/3/6/3.terrain", "terrain/3/6/2.terrain and terrain/3/6/3.terrain"],
         );
+        fs::write(&one, tile(place, higher, None)).unwrap();
+        assert_fails(folder.path(), 5, &["terrain/3/6/3.terrain has no water mask"]);
         fs::write(&one, &bytes[..bytes.len() - 3]).unwrap();
         assert_fails(folder.path(), 5, &["terrain/3/6/3.terrain is damaged"]);
         fs::write(&one, gzipped_mesh(b"no tile")).unwrap();
@@ -297,7 +321,24 @@ mod tests {
         fs::write(&one, &bytes).unwrap();
         fs::write(output.terrain_tile(3, [6, 4]), &bytes).unwrap();
         assert_fails(folder.path(), 6, &["terrain/ has 7 tiles, where layer.json lists 6"]);
-        fs::write(output.terrain_layer(), r#"{"available":[[{"startX":0,"endX":2,"startY":0,"endY":0}]]}"#).unwrap();
+    }
+
+    #[test]
+    fn a_list_of_impossible_tiles_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let output = written(folder.path());
+        let list = |projection: &str, last: i32| {
+            let rectangle = format!(r#"{{"startX":0,"endX":{last},"startY":0,"endY":0}}"#);
+            format!(r#"{{"projection":"{projection}","extensions":[],"available":[[{rectangle}]]}}"#)
+        };
+        for (projection, columns) in [("EPSG:4326", 2), ("EPSG:3857", 1)] {
+            let gone = (0..columns).map(|_| "is gone").collect::<Vec<_>>();
+            fs::write(output.terrain_layer(), list(projection, columns - 1)).unwrap();
+            assert_fails(folder.path(), 0, &[&gone[..], &["terrain/ has 6 tiles"]].concat());
+            fs::write(output.terrain_layer(), list(projection, columns)).unwrap();
+            assert_fails(folder.path(), 0, &["layer.json is no list"]);
+        }
+        fs::write(output.terrain_layer(), list("EPSG:32633", 0)).unwrap();
         assert_fails(folder.path(), 0, &["layer.json is no list"]);
     }
 

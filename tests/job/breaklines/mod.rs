@@ -10,8 +10,8 @@ mod terrain;
 
 use crate::program::{Job, gdt_batch, number};
 use files::{Features, geojson, geopackage, shapefile};
-pub(crate) use terrain::Survey;
 use terrain::{ISLAND, LAKE, Mesh, cross, inside};
+pub(crate) use terrain::{Survey, in_lake};
 
 /// The river comes from GeoJSON, the lake from a GeoPackage, and lines that cross from a Shapefile.
 #[test]

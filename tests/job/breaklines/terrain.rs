@@ -116,6 +116,11 @@ pub(super) fn inside(outline: &[[i64; 2]], p: [i64; 3]) -> bool {
     is_inside
 }
 
+/// Tells whether a place lies in the lake, and not on its island: centimetres from [`ORIGIN`].
+pub(crate) fn in_lake([x, y]: [i64; 2]) -> bool {
+    inside(&LAKE, [x, y, 0]) && !inside(&ISLAND, [x, y, 0])
+}
+
 /// The mesh in the tiles of a job, in steps from [`ORIGIN`].
 pub(super) struct Mesh {
     pub(super) vertices: HashSet<[i64; 3]>,

@@ -3,13 +3,12 @@
 use crate::plan::globe_system::globe_system;
 use crate::plan::job_plan::Plan;
 use crate::publish::terrain_tiles::globe_grid::Place;
+use crate::publish::terrain_tiles::limits::{beyond_latitudes, refused, scheme_of};
 use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
+use quantized_mesh::Scheme;
 use sys::{Error, Result};
 use tiles::tiles3d::globe::Globe;
-
-/// The greatest latitude in degrees: around a pole, columns are no longer beside each other.
-const MOST_LATITUDE: f64 = 89.0;
 
 /// The widest terrain in degrees of longitude.
 const MOST_LONGITUDES: f64 = 90.0;
@@ -34,15 +33,13 @@ pub(crate) fn globe_of(plan: &Plan) -> Result<Globe> {
 /// # Errors
 /// [`Error::Config`] if they cannot.
 pub(crate) fn check_terrain(plan: &Plan) -> Result<()> {
-    if plan.options.output.terrain.is_none() {
-        return Ok(());
-    }
+    let Some(scheme) = scheme_of(plan) else { return Ok(()) };
     let globe = globe_of(plan)?;
     // What headers claim may be far more than where points are, such as all of the globe. When they have been read, all of it is checked.
     let middle = Place::of(plan, &globe, plan.extent.middle()).map_err(|why| refused(&why))?;
     let places = corners(plan.extent).into_iter().filter_map(|corner| Place::of(plan, &globe, corner).ok());
     let lowest = places.map(|place| place.latitude.abs()).fold(middle.latitude.abs(), f64::min).to_degrees();
-    if lowest > MOST_LATITUDE { Err(beyond_latitudes(lowest)) } else { Ok(()) }
+    if lowest > scheme.most_latitude() { Err(beyond_latitudes(scheme, lowest)) } else { Ok(()) }
 }
 
 /// Returns the corners of a box.
@@ -50,17 +47,11 @@ fn corners(Bounds { min, max }: Bounds<2>) -> [[i32; 2]; 4] {
     [min, [max[0], min[1]], [min[0], max[1]], max]
 }
 
-fn beyond_latitudes(highest: f64) -> Error {
-    refused(&format!(
-        "the terrain reaches {highest:.2} degrees north or south, and the columns of tiles meet at the poles; {MOST_LATITUDE} degrees is the limit"
-    ))
-}
-
-/// Checks that a terrain within `bounds` is neither around a pole nor around the globe.
+/// Checks that a terrain within `bounds` is neither too near to a pole nor around the globe.
 ///
 /// # Errors
 /// [`Error::Config`] if it is.
-pub(crate) fn check_places(plan: &Plan, globe: &Globe, bounds: Bounds<2>) -> Result<()> {
+pub(crate) fn check_places(plan: &Plan, globe: &Globe, scheme: Scheme, bounds: Bounds<2>) -> Result<()> {
     const PARTS: i64 = 4;
     let along = |axis: usize, part: i64| (i64::from(bounds.min[axis]) + bounds.extent(axis) * part / PARTS) as i32;
     let places = (0..=PARTS).flat_map(|i| (0..=PARTS).map(move |j| [along(0, i), along(1, j)]));
@@ -72,8 +63,8 @@ pub(crate) fn check_places(plan: &Plan, globe: &Globe, bounds: Bounds<2>) -> Res
         highest = highest.max(place.latitude.to_degrees().abs());
         widest = widest.max(2.0 * (place.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs());
     }
-    if highest > MOST_LATITUDE {
-        return Err(beyond_latitudes(highest));
+    if highest > scheme.most_latitude() {
+        return Err(beyond_latitudes(scheme, highest));
     }
     if widest > MOST_LONGITUDES {
         return Err(refused(&format!(
@@ -81,10 +72,4 @@ pub(crate) fn check_places(plan: &Plan, globe: &Globe, bounds: Bounds<2>) -> Res
         )));
     }
     Ok(())
-}
-
-fn refused(why: &str) -> Error {
-    Error::Config(format!(
-        "[output.terrain] cannot be written: {why}; fix: smaller [input] bounds, or leave [output.terrain] out"
-    ))
 }

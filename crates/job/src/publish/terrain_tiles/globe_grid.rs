@@ -5,7 +5,8 @@
 //! Cells are those of the lattice, not of tiles of the job, so that a point has the same place in all of them.
 
 use crate::plan::job_plan::Plan;
-use quantized_mesh::{GridPoint, HALF_MERIDIAN};
+use crate::publish::terrain_tiles::limits::beyond_latitudes;
+use quantized_mesh::{GridPoint, Scheme, Tile, TileGrid};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use sys::{Error, Result};
@@ -55,33 +56,37 @@ fn place_at(extras: &Extras, globe: &Globe, point: [f64; 2]) -> std::result::Res
 pub(super) struct GlobeGrid<'a> {
     extras: &'a Extras,
     globe: &'a Globe,
+    scheme: Scheme,
     zoom: u8,
     /// The side of a cell is two to the power of this, in lattice steps.
     shift: u32,
-    /// A longitude of the terrain.
-    longitude: f64,
+    /// A place of the terrain.
+    middle: Place,
 }
 
 /// The places at the corners of a cell: south-west, south-east, north-west, north-east. `None` if one is not known.
 type Cell = Option<[Place; 4]>;
 
 impl<'a> GlobeGrid<'a> {
-    /// Returns the grid of a zoom. A place of the terrain is at `longitude`.
-    pub(super) fn new(plan: &'a Plan, globe: &'a Globe, zoom: u8, longitude: f64) -> GlobeGrid<'a> {
+    /// Returns the grid of a zoom. `middle` is a place of the terrain.
+    pub(super) fn new(plan: &'a Plan, globe: &'a Globe, scheme: Scheme, zoom: u8, middle: Place) -> GlobeGrid<'a> {
         let step = plan.frame.resolution_metres()[0];
-        let side = (HALF_MERIDIAN / f64::from(1u32 << zoom) / CELLS_PER_TILE).min(LONGEST_CELL);
+        let [_, height] = scheme.sides_in_metres(zoom, middle.latitude);
+        let side = (height / CELLS_PER_TILE).min(LONGEST_CELL);
         let shift = (0..24).take_while(|shift| step * f64::from(2u32 << shift) <= side).count() as u32;
-        GlobeGrid { extras: plan.frame.extras(), globe, zoom, shift, longitude }
+        GlobeGrid { extras: plan.frame.extras(), globe, scheme, zoom, shift, middle }
     }
 
     /// Returns the grid points of lattice points.
     ///
     /// # Errors
-    /// [`Error::Config`] if the place of one is not known.
+    /// [`Error::Config`] if the place of one is not known, or too near to a pole.
     pub(super) fn points(&self, positions: &[[i32; 3]]) -> Result<Vec<GridPoint>> {
         let mut cells: HashMap<[i32; 2], Cell> = HashMap::new();
         let mut corners: HashMap<[i32; 2], Option<Place>> = HashMap::new();
         let mut current: Option<([i32; 2], Cell)> = None;
+        let mut grid = TileGrid::new(self.scheme, self.zoom);
+        let most_latitude = self.scheme.most_latitude().to_radians();
         let mut points = Vec::with_capacity(positions.len());
         for &[x, y, z] in positions {
             let number = [x >> self.shift, y >> self.shift];
@@ -94,18 +99,21 @@ impl<'a> GlobeGrid<'a> {
                 Some(places) => self.between(places, [x, y]),
                 None => self.place([f64::from(x), f64::from(y)])?,
             };
+            if place.latitude.abs() > most_latitude {
+                return Err(beyond_latitudes(self.scheme, place.latitude.to_degrees().abs()));
+            }
             let height =
                 (self.extras.offset[2] + self.extras.resolution_z * f64::from(z)) * self.extras.metres_per_unit_z;
-            let point = GridPoint::nearest(self.zoom, [place.longitude, place.latitude], height + place.offset);
+            let point = grid.nearest([place.longitude, place.latitude], height + place.offset);
             let too_high = || Error::Config(format!("[output.terrain] has no heights such as {height:.0} m"));
             points.push(point.ok_or_else(too_high)?);
         }
         Ok(points)
     }
 
-    /// Returns its zoom.
-    pub(super) fn zoom(&self) -> u8 {
-        self.zoom
+    /// Returns the tile of its zoom in a column and a row.
+    pub(super) fn tile(&self, [x, y]: [i32; 2]) -> Tile {
+        Tile { scheme: self.scheme, zoom: self.zoom, y, x }
     }
 
     /// Returns the area of a square lattice step at a point in square metres; negative if the axes turn the other way than east and north.
@@ -127,7 +135,7 @@ impl<'a> GlobeGrid<'a> {
     /// Returns the place of a lattice place.
     pub(super) fn place(&self, point: [f64; 2]) -> Result<Place> {
         match place_at(self.extras, self.globe, point) {
-            Ok(place) => Ok(place.beside(self.longitude)),
+            Ok(place) => Ok(place.beside(self.middle.longitude)),
             Err(NotPlaced::Height(error)) => Err(error),
             Err(NotPlaced::System(why)) => {
                 let [x, y] = [0, 1].map(|axis: usize| self.extras.offset[axis] + self.extras.resolution * point[axis]);

@@ -9,5 +9,7 @@ pub(crate) mod check;
 pub(crate) mod write_terrain;
 
 mod globe_grid;
+mod lakes;
+mod limits;
 mod waiting;
 mod zooms;

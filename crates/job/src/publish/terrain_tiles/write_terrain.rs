@@ -7,11 +7,13 @@ use crate::publish::raster::tile_meshes::{TileBox, boxes, lattice_mesh};
 use crate::publish::side_files::EachTile;
 use crate::publish::terrain_tiles::check::{check_places, globe_of};
 use crate::publish::terrain_tiles::globe_grid::{GlobeGrid, Place};
+use crate::publish::terrain_tiles::lakes::{self, shores_of};
+use crate::publish::terrain_tiles::limits::scheme_of;
 use crate::publish::terrain_tiles::waiting::WaitingRecords;
 use crate::publish::terrain_tiles::zooms::{Surroundings, WaitingPiece, Zoom};
 use crate::tiles::write_tile::TileStats;
 use delaunay::geometry::Bounds;
-use quantized_mesh::{HEIGHT_STEPS, LayerAbout, Tile, ZoomTiles, cut, finest_zoom, layer};
+use quantized_mesh::{HEIGHT_STEPS, LayerAbout, Scheme, Shore, Tile, Water, ZoomTiles, cut, finest_zoom, layer};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -50,6 +52,7 @@ pub struct ZoomStats {
 /// Terrain tiles that are to be written.
 pub(crate) struct TerrainWork<'a> {
     plan: &'a Plan,
+    scheme: Scheme,
     frame: &'a Frame,
     tiles: Vec<TileBox>,
     /// Figures of all tiles together.
@@ -90,10 +93,8 @@ impl<'a> TerrainWork<'a> {
         tiles: &dyn EachTile,
         stats: &'a TileStats,
     ) -> Result<Option<TerrainWork<'a>>> {
-        if plan.options.output.terrain.is_none() {
-            return Ok(None);
-        }
-        Ok(Some(TerrainWork { plan, frame, tiles: boxes(tiles)?, stats, globe: globe_of(plan)? }))
+        let Some(scheme) = scheme_of(plan) else { return Ok(None) };
+        Ok(Some(TerrainWork { plan, scheme, frame, tiles: boxes(tiles)?, stats, globe: globe_of(plan)? }))
     }
 
     /// Returns the number of steps. For each tile there is one to cut it, and what the zooms take together is divided into others.
@@ -112,14 +113,16 @@ impl<'a> TerrainWork<'a> {
     ) -> Result<(TerrainStats, Vec<PendingFile>)> {
         let bounds = self.tiles.iter().map(|tile| tile.bounds).reduce(Bounds::union);
         let bounds = bounds.ok_or_else(|| Error::Broken("there is no triangle for terrain tiles".into()))?;
-        check_places(self.plan, &self.globe, bounds)?;
+        let scheme = self.scheme;
+        check_places(self.plan, &self.globe, scheme, bounds)?;
         let middle = bounds.middle();
         let place = Place::of(self.plan, &self.globe, middle).map_err(Error::Config)?;
-        let grid = |zoom: u8| GlobeGrid::new(self.plan, &self.globe, zoom, place.longitude);
+        let grid = |zoom: u8| GlobeGrid::new(self.plan, &self.globe, scheme, zoom, place);
         // Any zoom tells the area of a step.
-        let area_of_step = grid(quantized_mesh::MOST_ZOOM).area_of_step(middle)?;
+        let area_of_step = grid(20).area_of_step(middle)?;
         let area = self.stats.double_area as f64 / 2.0 * area_of_step.abs();
-        let zoom = finest_zoom(area, self.stats.triangles / 2, place.latitude);
+        let zoom = finest_zoom(scheme, area, self.stats.triangles / 2, place.latitude);
+        let shores = shores_of(self.plan, &grid(zoom))?;
         let (pieces, list) = self.cut(directory, &grid(zoom), area_of_step < 0.0, done)?;
         // Each tile is joined or selected, and written. The coarser zooms have a third as many as the finest.
         let finest_tiles = list.iter().map(|(tile, _)| tile).collect::<HashSet<_>>().len() as u64;
@@ -130,19 +133,31 @@ impl<'a> TerrainWork<'a> {
             finished: AtomicU64::new(0),
         };
         let finish_tile = &|| steps.finish_tile();
-        let mut finest = Zoom::finest(zoom, directory, pieces, list, finish_tile)?;
-        let surroundings = Surroundings { height: finest.mean_edge() };
-        let mut pyramid =
-            Pyramid { directory, surroundings, stats: TerrainStats::default(), files: Vec::new(), zooms: Vec::new() };
+        let mut finest = Zoom::finest((scheme, zoom), directory, pieces, list, finish_tile)?;
+        let surroundings = Surroundings { scheme, height: finest.mean_edge() };
+        let lakes = shores.map(|shores| Lakes { shores, scheme, finest: zoom });
+        let mut pyramid = Pyramid {
+            directory,
+            surroundings,
+            lakes,
+            stats: TerrainStats::default(),
+            files: Vec::new(),
+            zooms: Vec::new(),
+        };
         pyramid.stats.surroundings = f64::from(surroundings.height) / HEIGHT_STEPS;
-        let degrees = degrees_of(&finest.tiles.iter().map(|tile| tile.tile).collect::<Vec<Tile>>());
+        let degrees = degrees_of(scheme, &finest.tiles.iter().map(|tile| tile.tile).collect::<Vec<Tile>>());
         while finest.zoom > 0 {
             let coarser = finest.coarser(directory, surroundings, finish_tile)?;
             pyramid.write(finest, finish_tile)?;
             finest = coarser;
         }
         pyramid.write(finest, finish_tile)?;
-        let about = LayerAbout { bounds: degrees, attribution: self.plan.options.output.copyright() };
+        let about = LayerAbout {
+            scheme,
+            has_water: pyramid.lakes.is_some(),
+            bounds: degrees,
+            attribution: self.plan.options.output.copyright(),
+        };
         pyramid.finish(&about)
     }
 
@@ -163,7 +178,7 @@ impl<'a> TerrainWork<'a> {
             }
             let points = grid.points(&mesh.positions)?;
             for ([x, y], piece) in cut(&points, &mesh.triangles) {
-                let piece = (Tile { zoom: grid.zoom(), x, y }, file.add_piece(&piece)?);
+                let piece = (grid.tile([x, y]), file.add_piece(&piece)?);
                 list.lock().unwrap_or_else(PoisonError::into_inner).push(piece);
             }
             done(1);
@@ -173,10 +188,19 @@ impl<'a> TerrainWork<'a> {
     }
 }
 
+/// The lakes of the job.
+struct Lakes {
+    shores: Vec<Shore>,
+    scheme: Scheme,
+    /// The zoom whose grid the shores are on.
+    finest: u8,
+}
+
 /// The zooms that are written so far, the finest first.
 struct Pyramid<'a> {
     directory: &'a JobDirectory,
     surroundings: Surroundings,
+    lakes: Option<Lakes>,
     stats: TerrainStats,
     files: Vec<PendingFile>,
     zooms: Vec<ZoomTiles>,
@@ -192,7 +216,9 @@ impl Pyramid<'_> {
             finish_tile();
             written
         };
-        self.files.extend(zoom.encode(self.surroundings, &write)?);
+        let water = |lakes: &Lakes| Water::new(lakes.scheme, [zoom.zoom, lakes.finest], &lakes.shores);
+        let water = self.lakes.as_ref().map(water);
+        self.files.extend(zoom.encode(self.surroundings, water.as_ref(), &write)?);
         let tiles: Vec<Tile> = zoom.tiles.iter().map(|tile| tile.tile).collect();
         self.zooms.push(ZoomTiles::new(&tiles));
         self.stats.zooms.push(ZoomStats {
@@ -217,21 +243,27 @@ impl Pyramid<'_> {
 }
 
 /// Returns west, south, east and north of tiles in degrees.
-fn degrees_of(tiles: &[Tile]) -> [f64; 4] {
-    let side = tiles.first().map_or(180.0, |tile| 180.0 / f64::from(1u32 << tile.zoom));
+fn degrees_of(scheme: Scheme, tiles: &[Tile]) -> [f64; 4] {
+    let zoom = tiles.first().map_or(0, |tile| tile.zoom);
+    let side = 360.0 / f64::from(scheme.columns(zoom));
     let ends = |along: fn(&Tile) -> i32| {
         let numbers = tiles.iter().map(along);
         let [low, high] = numbers.fold([i32::MAX, i32::MIN], |[low, high], number| [low.min(number), high.max(number)]);
-        [f64::from(low) * side, (f64::from(high) + 1.0) * side]
+        [low, high.saturating_add(1)]
     };
-    let ([west, east], [south, north]) = (ends(|tile| tile.x), ends(|tile| tile.y));
+    let [west, east] = ends(|tile| tile.x).map(|column| f64::from(column) * side - 180.0);
+    let [south, north] = ends(|tile| tile.y).map(|row| scheme.degrees(zoom, row));
     let turned = |degrees: f64| if degrees > 180.0 { degrees - 360.0 } else { degrees };
-    [(west - 180.0).max(-180.0), south - 90.0, turned(east - 180.0), north - 90.0]
+    [west.max(-180.0), south, turned(east), north]
 }
 
 /// Returns about how many bytes of memory terrain tiles take on so many threads.
 pub(crate) fn terrain_memory(plan: &Plan, threads: usize) -> u64 {
     // A tile of the job, its points on the grid and its pieces; or four tiles and the selection from them.
     const PER_THREAD: u64 = 64 << 20;
-    if plan.options.output.terrain.is_some() { threads as u64 * PER_THREAD } else { 0 }
+    let sites = plan.breaklines.as_ref().map_or(0, |lines| lines.findings.sites);
+    match plan.options.output.terrain {
+        Some(_) => threads as u64 * PER_THREAD + sites * lakes::BYTES_PER_SITE,
+        None => 0,
+    }
 }

@@ -3,7 +3,8 @@
 use crate::durable::directory::JobDirectory;
 use crate::publish::terrain_tiles::waiting::WaitingRecords;
 use quantized_mesh::{
-    BorderNormal, Child, HeightSteps, OUTSIDE, Surface, Tile, TileMesh, assemble, border_normals, coarser, encode, flat,
+    BorderNormal, Child, HeightSteps, OUTSIDE, Scheme, Surface, Tile, TileMesh, Water, assemble, border_normals,
+    coarser, encode, flat,
 };
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -29,6 +30,7 @@ pub(super) struct WaitingTile {
 
 /// The tiles of a zoom.
 pub(super) struct Zoom {
+    scheme: Scheme,
     pub(super) zoom: u8,
     /// In order.
     pub(super) tiles: Vec<WaitingTile>,
@@ -44,7 +46,7 @@ impl Zoom {
     /// # Errors
     /// [`Error::Io`], [`Error::Interrupted`].
     pub(super) fn finest(
-        zoom: u8,
+        (scheme, zoom): (Scheme, u8),
         directory: &JobDirectory,
         pieces: WaitingRecords,
         mut list: Vec<WaitingPiece>,
@@ -62,7 +64,7 @@ impl Zoom {
         });
         let tiles = made.collect::<Result<Vec<Option<WaitingTile>>>>()?.into_iter().flatten().collect();
         pieces.discard()?;
-        let mut finest = Zoom { zoom, tiles, file };
+        let mut finest = Zoom { scheme, zoom, tiles, file };
         finest.surround()?;
         Ok(finest)
     }
@@ -83,7 +85,7 @@ impl Zoom {
         Ok(())
     }
 
-    /// Returns the tiles of the zoom before. At zoom 0 both are there, because viewers want both. `surroundings` is the height beside the terrain.
+    /// Returns the tiles of the zoom before. At zoom 0 all are there, because viewers want all. `surroundings` is the height beside the terrain.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Interrupted`].
@@ -107,14 +109,14 @@ impl Zoom {
         });
         let mut tiles: Vec<WaitingTile> = made.collect::<Result<_>>()?;
         if zoom == 0 {
-            for x in 0..2 {
+            for x in 0..self.scheme.columns(zoom) {
                 if !tiles.iter().any(|tile| tile.tile.column() == x) {
-                    let tile = Tile { zoom, x, y: 0 };
+                    let tile = Tile { scheme: self.scheme, zoom, x, y: 0 };
                     tiles.push(WaitingTile::add(&file, tile, &flat(tile).map_err(broken)?, 0)?);
                 }
             }
         }
-        Ok(Zoom { zoom, tiles, file })
+        Ok(Zoom { scheme: self.scheme, zoom, tiles, file })
     }
 
     /// Makes the tile above some, which are all tiles in it.
@@ -150,13 +152,14 @@ impl Zoom {
         HeightSteps::over(self.tiles.iter().map(range).max().unwrap_or(0).into())
     }
 
-    /// Calls `write` with each tile and the bytes of its file.
+    /// Calls `write` with each tile and the bytes of its file. `water` is the water of the zoom, if tiles tell that.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Interrupted`], and those of `write`.
     pub(super) fn encode<T: Send>(
         &self,
         surroundings: Surroundings,
+        water: Option<&Water>,
         write: &(dyn Fn(Tile, Vec<u8>) -> Result<T> + Sync),
     ) -> Result<Vec<T>> {
         let outside = surroundings.at(self.zoom);
@@ -165,7 +168,7 @@ impl Zoom {
         let encoded = self.tiles.par_iter().with_max_len(1).map(|waiting| {
             interrupt::check()?;
             let (mesh, around) = (self.file.mesh(waiting.at)?, self.around(waiting.tile, &places)?);
-            let surface = Surface { tile: waiting.tile, mesh: &mesh, outside, around: &around };
+            let surface = Surface { tile: waiting.tile, mesh: &mesh, outside, around: &around, water };
             write(waiting.tile, gzipped_mesh(&encode(&surface, steps)))
         });
         encoded.collect()
@@ -223,6 +226,7 @@ fn offsets() -> impl Iterator<Item = [i32; 2]> {
 /// What lies beside the terrain: a plain at the height of its edge, and the ellipsoid where the bound of a zoom is greater than that.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surroundings {
+    pub(super) scheme: Scheme,
     /// In steps.
     pub(super) height: i32,
 }
@@ -230,7 +234,7 @@ pub(super) struct Surroundings {
 impl Surroundings {
     /// Returns the height at a zoom.
     pub(super) fn at(self, zoom: u8) -> i32 {
-        if quantized_mesh::bound(zoom) <= self.height.unsigned_abs().into() { self.height } else { 0 }
+        if quantized_mesh::bound(self.scheme, zoom) <= self.height.unsigned_abs().into() { self.height } else { 0 }
     }
 }
 

@@ -1,0 +1,35 @@
+//! The tiling scheme of a job, and which terrains it does not take.
+
+use crate::plan::job_plan::Plan;
+use quantized_mesh::Scheme;
+use sys::Error;
+use tiles::terrain_options::TerrainScheme;
+
+/// Returns the tiling scheme that the user wants, if the user wants terrain tiles.
+pub(super) fn scheme_of(plan: &Plan) -> Option<Scheme> {
+    plan.options.output.terrain.map(|terrain| match terrain.scheme {
+        TerrainScheme::Geographic => Scheme::Geographic,
+        TerrainScheme::WebMercator => Scheme::WebMercator,
+    })
+}
+
+/// Returns the error about a terrain that comes too near to a pole, up to a latitude in degrees.
+pub(super) fn beyond_latitudes(scheme: Scheme, highest: f64) -> Error {
+    let limit = scheme.most_latitude();
+    match scheme {
+        Scheme::Geographic => refused(&format!(
+            "the terrain reaches {highest:.2} degrees north or south, and the columns of tiles meet at the poles; {limit} degrees is the limit"
+        )),
+        Scheme::WebMercator => Error::Config(format!(
+            "[output.terrain] cannot be written: the terrain reaches {highest:.2} degrees north or south, and web mercator ends at {limit} \
+             degrees; fix: scheme = \"geographic\", smaller [input] bounds, or leave [output.terrain] out"
+        )),
+    }
+}
+
+/// Returns the error about a terrain that terrain tiles cannot have.
+pub(super) fn refused(why: &str) -> Error {
+    Error::Config(format!(
+        "[output.terrain] cannot be written: {why}; fix: smaller [input] bounds, or leave [output.terrain] out"
+    ))
+}
