@@ -5,7 +5,7 @@
 
 use memmap2::{Mmap, MmapOptions};
 use std::fs::File;
-use std::io::{ErrorKind, Result};
+use std::io::Result;
 use std::ops::Deref;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use sys::address_space;
@@ -118,7 +118,7 @@ fn remove_pages(_map: &Mmap) {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::Write;
+    use std::io::{ErrorKind, Write};
 
     fn file_of(bytes: &[u8]) -> File {
         let mut file = tempfile::tempfile().unwrap();
