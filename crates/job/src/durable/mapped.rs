@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn parts_of_any_size_and_place_hold_what_was_written() {
-        let bytes: Vec<u8> = (0..400_000u32).map(|i| (i * 7919 >> 8) as u8).collect();
+        let bytes: Vec<u8> = (0..400_000u32).map(|i| ((i * 7919) >> 8) as u8).collect();
         let file = file_of(&bytes);
         for map in [MappedFile::new(&file), MappedFile::default()] {
             for (first, count) in [(0, 0), (400_000, 0), (0, 1), (1, 3), (1023, 9_000), (5, 399_995), (0, 400_000)] {
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn parts_stay_as_they_are_when_pages_are_removed() {
-        let bytes: Vec<u8> = (0..3 * MOST_RESIDENT as u32).map(|i| (i * 7919 >> 8) as u8).collect();
+        let bytes: Vec<u8> = (0..3 * MOST_RESIDENT as u32).map(|i| ((i * 7919) >> 8) as u8).collect();
         let file = file_of(&bytes);
         let map = MappedFile::new(&file);
         let parts: Vec<_> = (0..12).map(|i| map.part(&file, i << 20, 1 << 20).unwrap()).collect();
