@@ -50,7 +50,7 @@ impl JobDirectory {
     /// Returns the directories of all parts that have one, and that of the nodes above the parts.
     ///
     /// # Errors
-    /// [`Error::Io`] if they cannot be listed.
+    /// [`sys::Error::Io`] if they cannot be listed.
     pub fn folders_of_parts(&self) -> Result<Vec<JobDirectory>> {
         let number = |path: PathBuf| path.file_name()?.to_str()?.parse().ok().map(PartIndex);
         let parts = entries(&self.parts())?.into_iter().filter_map(number).map(|part| self.part(part));
@@ -130,7 +130,7 @@ impl JobDirectory {
     /// Returns the numbers and the paths of all point files.
     ///
     /// # Errors
-    /// [`Error::Io`] if they cannot be listed.
+    /// [`sys::Error::Io`] if they cannot be listed.
     pub fn point_files(&self) -> Result<Vec<(u16, PathBuf)>> {
         let number = |path: &Path| path.file_name()?.to_str()?.strip_suffix(".points")?.parse().ok();
         Ok(entries(&self.points)?.into_iter().filter_map(|path| Some((number(&path)?, path))).collect())
@@ -139,7 +139,7 @@ impl JobDirectory {
     /// Looks at what is in this folder. A network file system that remembers what was not there is right from then on.
     ///
     /// # Errors
-    /// [`Error::Io`] if the folder cannot be listed.
+    /// [`sys::Error::Io`] if the folder cannot be listed.
     pub fn probe(&self) -> Result<()> {
         entries(&self.job).map(|_| ())
     }
@@ -170,7 +170,7 @@ impl JobDirectory {
     /// does.
     ///
     /// # Errors
-    /// [`Error::Io`] if a file cannot be removed.
+    /// [`sys::Error::Io`] if a file cannot be removed.
     pub fn clear(&self, keep: &HashSet<PathBuf>) -> Result<()> {
         self.remove_files_but(keep, &[self.journal()])?;
         let folders = [self.parts(), self.points_by_part(), self.join().job];
@@ -180,7 +180,7 @@ impl JobDirectory {
     /// Removes the results that wait, except those with these names, and the files that only a run needs that is under way.
     ///
     /// # Errors
-    /// [`Error::Io`] if a file cannot be removed.
+    /// [`sys::Error::Io`] if a file cannot be removed.
     pub(crate) fn keep_results(&self, names: &HashSet<PathBuf>) -> Result<()> {
         self.remove_files_but(names, &[self.journal(), self.plan(), self.first_plan()])
     }
@@ -202,7 +202,7 @@ impl JobDirectory {
     /// was cut off. If this succeeds, all of them are in place. With `--update` they stay where they wait, too.
     ///
     /// # Errors
-    /// [`Error::Io`] if a file is missing, or cannot be renamed or removed.
+    /// [`sys::Error::Io`] if a file is missing, or cannot be renamed or removed.
     pub fn replace_results(&self, names: &HashSet<PathBuf>, keeps_waiting: bool) -> Result<()> {
         let on_the_way = keeps_waiting.then(|| self.on_the_way());
         let replacement = Replacement::prepare(&self.results, &self.waiting, names, on_the_way)?;
