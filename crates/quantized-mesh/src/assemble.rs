@@ -1,7 +1,7 @@
 //! Joining the pieces of a tile.
 
 use crate::cut::Piece;
-use crate::fill::{fill, planar};
+use crate::fill::{fill, planar, within_border};
 use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, double_area, in_order};
 use crate::number_hash::NumberMap;
 use crate::unfold::unfolded;
@@ -9,8 +9,8 @@ use crate::unfold::unfolded;
 /// Twice the area of a tile in square steps.
 const WHOLE: i64 = 2 * (LAST as i64) * (LAST as i64);
 
-/// Joins what the terrain has in a tile, and fills the rest of it. Of vertices that share a place the highest stays. `None` if the terrain has no
-/// area there.
+/// Joins what the terrain has in a tile, and fills the rest of it. Of vertices that share a place the highest stays. `None` if the terrain does not
+/// reach the tile.
 pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
     let mut corners = [None; 4];
     for piece in pieces {
@@ -28,7 +28,12 @@ pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
     let (area, is_upright) = areas.fold((0, true), |(sum, all), area| (sum + area, all && area > 0));
     let (mut kept, is_unfolded) = if is_upright { (all, true) } else { unfolded(&nodes, all) };
     if kept.is_empty() {
-        return None;
+        // The terrain only touches the tile: those beside it have these vertices too.
+        if nodes.iter().all(|node| !node.is_on_border() || node.h == OUTSIDE) {
+            return None;
+        }
+        let triangles = within_border(&nodes);
+        return Some(without_unused(nodes, &triangles));
     }
     if !is_unfolded || !has_all_on_border(&nodes, &kept) {
         kept = planar(&nodes, &kept);

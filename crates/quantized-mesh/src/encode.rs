@@ -13,10 +13,10 @@ use crate::water::Water;
 pub struct HeightSteps(i64);
 
 impl HeightSteps {
-    /// Returns the step for tiles whose lowest and highest heights are `range` steps apart, at most.
-    pub fn over(range: u64) -> HeightSteps {
-        let range = i64::try_from(range).unwrap_or(i64::MAX >> 8);
-        HeightSteps(smallest(range))
+    /// Returns the step for tiles whose lowest and highest heights are `range` steps apart, and `farthest` from zero, at most.
+    pub fn over(range: u64, farthest: u64) -> HeightSteps {
+        let [range, farthest] = [range, farthest].map(|steps| i64::try_from(steps).unwrap_or(i64::MAX >> 8));
+        HeightSteps(smallest(range, farthest))
     }
 
     /// Returns the step in metres.
@@ -25,9 +25,13 @@ impl HeightSteps {
     }
 }
 
-/// Returns the smallest power of two of which so many steps, rounded outwards at both ends, are no more than a tile can have.
-fn smallest(range: i64) -> i64 {
-    let fits = |step: &i64| range + 2 * step <= i64::from(LAST) * step;
+/// Steps from zero, with room for a tile, that the header holds exactly: its numbers have 24 bits.
+const MOST_EXACT: i64 = (1 << 24) - (1 << 16);
+
+/// Returns the smallest power of two of which `range` steps, rounded outwards at both ends, are no more than a tile can have, and `farthest` steps
+/// from zero are no more than its header holds exactly.
+fn smallest(range: i64, farthest: i64) -> i64 {
+    let fits = |step: &i64| range + 2 * step <= i64::from(LAST) * step && farthest <= MOST_EXACT.saturating_mul(*step);
     (0..48).map(|bit| 1 << bit).find(fits).unwrap_or(1 << 48)
 }
 
@@ -101,17 +105,17 @@ struct Heights {
 
 impl Heights {
     fn new(surface: &Surface, HeightSteps(shared): HeightSteps) -> Heights {
-        let height = |node: &Node| i64::from(node.height(surface.outside));
-        let nodes = &surface.mesh.nodes;
-        let (low, high) =
-            nodes.iter().map(height).fold((i64::MAX, i64::MIN), |(low, high), h| (low.min(h), high.max(h)));
-        let least = low.div_euclid(shared) * shared;
-        let step = smallest(high - least).min(shared);
-        let rounded = |node: &Node| {
-            let step = if node.is_on_border() { shared } else { step };
-            (2 * height(node) + step).div_euclid(2 * step) * step
+        let nearest = |height: i64, step: i64| (2 * height + step).div_euclid(2 * step) * step;
+        // Neighbours must have the same heights on the border, so those are rounded first.
+        let height = |node: &Node| match i64::from(node.height(surface.outside)) {
+            height if node.is_on_border() => nearest(height, shared),
+            height => height,
         };
-        Heights { least, step, rounded: nodes.iter().map(rounded).collect() }
+        let heights: Vec<i64> = surface.mesh.nodes.iter().map(height).collect();
+        let (low, high) = heights.iter().fold((i64::MAX, i64::MIN), |(low, high), h| (low.min(*h), high.max(*h)));
+        let least = low.div_euclid(shared) * shared;
+        let step = smallest(high - least, least.abs().max(high.abs())).min(shared);
+        Heights { least, step, rounded: heights.into_iter().map(|height| nearest(height, step)).collect() }
     }
 
     /// Returns the heights in metres that the least and the greatest number stand for.

@@ -29,6 +29,11 @@ pub(crate) fn fill(nodes: &[Node], inner: &[[u32; 2]], around: &[[u32; 2]]) -> V
     faces
 }
 
+/// Returns triangles between all vertices on the border of a tile.
+pub(crate) fn within_border(nodes: &[Node]) -> Vec<[u32; 3]> {
+    faces(nodes, (0..).zip(nodes).filter(|(_, node)| node.is_on_border()).map(|(v, _)| v), &[])
+}
+
 /// Returns triangles between all vertices of a tile that have as many as possible of the edges of `triangles`.
 pub(crate) fn planar(nodes: &[Node], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);

@@ -250,11 +250,76 @@ proptest! {
         }
     }
 
+    /// A terrain that ends at borders of tiles: those beside it have its vertices there.
+    #[test]
+    fn tiles_that_terrain_only_touches_meet_it(
+        seed in 0u64..1 << 40,
+        count in 0usize..200,
+        reach in prop::sample::select(vec![40i64, 3_000, SPAN / 2 + 1, SPAN]),
+        ends in prop::array::uniform2(-1i64..2),
+    ) {
+        let mut terrain = terrain(seed, count, reach, 1);
+        for point in &mut terrain.points {
+            (point.x, point.y) = (point.x + ends[0] * reach, point.y + ends[1] * reach);
+        }
+        let mut finer = tiles(&terrain, 2);
+        let has_heights = |along: Vec<[i32; 2]>| along.iter().any(|[_, height]| *height != OUTSIDE);
+        for ([x, y], mesh) in &finer {
+            for (number, beside) in [[x - 1, *y], [x + 1, *y], [*x, y - 1], [*x, y + 1]].iter().enumerate() {
+                prop_assert!(finer.contains_key(beside) || !has_heights(side(mesh, number)), "{beside:?}");
+            }
+        }
+        finer.values().for_each(check_whole);
+        check_meeting(&finer);
+        for zoom in (ZOOM - 3..ZOOM).rev() {
+            let mut children: BTreeMap<[i32; 2], Vec<Child>> = BTreeMap::new();
+            for ([x, y], mesh) in finer {
+                let child = Child { quadrant: [(x & 1) as u8, (y & 1) as u8], nodes: mesh.nodes };
+                children.entry([x >> 1, y >> 1]).or_default().push(child);
+            }
+            let make = |([x, y], children): ([i32; 2], Vec<Child>)| {
+                ([x, y], coarser(Tile { scheme: SCHEME, zoom, x, y }, &children, 0).unwrap().0)
+            };
+            finer = children.into_iter().map(make).collect();
+            check_meeting(&finer);
+        }
+    }
+
+    /// At any altitude, and whatever the range of each tile.
+    #[test]
+    fn heights_on_borders_are_those_of_neighbours(
+        seed in 0u64..1 << 40,
+        count in 1usize..100,
+        altitude in -40_000_000i32..40_000_000,
+        range in 1i64..1 << 17,
+        peak in 0i32..20_000_000,
+    ) {
+        let mut terrain = terrain(seed, count, 50_000, 1);
+        terrain.points.iter_mut().for_each(|point| point.z = (i64::from(point.z) * range / 200_000) as i32 + altitude);
+        terrain.points[0].z += peak;
+        let meshes = tiles(&terrain, 1);
+        let heights = meshes.values().flat_map(|mesh| mesh.nodes.iter().map(|node| i64::from(node.height(altitude))));
+        let (low, high) = heights.fold((i64::MAX, i64::MIN), |(low, high), h| (low.min(h), high.max(h)));
+        let steps = HeightSteps::over(high.abs_diff(low), low.unsigned_abs().max(high.unsigned_abs()));
+        let mut found: BTreeMap<[i64; 2], f64> = BTreeMap::new();
+        for ([x, y], mesh) in &meshes {
+            let tile = Tile { scheme: SCHEME, zoom: ZOOM, x: *x, y: *y };
+            let surface = Surface { tile, mesh, outside: altitude, around: &[], water: None };
+            let decoded = decode(&encode(&surface, steps)).unwrap();
+            for (i, [u, v, _]) in decoded.vertices.iter().enumerate() {
+                let along = |tile: i32, steps: u16| i64::from(tile) * SPAN + i64::from(steps);
+                let place = [along(*x, *u), along(*y, *v)];
+                let known = *found.entry(place).or_insert(decoded.height(i));
+                prop_assert_eq!(known, decoded.height(i));
+            }
+        }
+    }
+
     #[test]
     fn tiles_come_back_from_their_bytes(seed in 0u64..1 << 40, count in 1usize..300, range in 1i64..1 << 20) {
         let mut terrain = terrain(seed, count, 50_000, 1);
         terrain.points.iter_mut().for_each(|point| point.z = (i64::from(point.z) * range / 200_000) as i32 - 5_000);
-        let steps = HeightSteps::over(2 * range as u64 + 20_000);
+        let steps = HeightSteps::over(2 * range as u64 + 20_000, 2 * range as u64 + 20_000);
         for ([x, y], mesh) in tiles(&terrain, 1) {
             let surface = Surface { tile: Tile { scheme: SCHEME, zoom: ZOOM, x, y }, mesh: &mesh, outside: 3, around: &[], water: None };
             let bytes = encode(&surface, steps);
@@ -295,7 +360,7 @@ proptest! {
         let terrain = terrain(seed, 30, 50_000, 1);
         let (place, mesh) = tiles(&terrain, 1).pop_first().unwrap();
         let surface = Surface { tile: Tile { scheme: SCHEME, zoom: ZOOM, x: place[0], y: place[1] }, mesh: &mesh, outside: 0, around: &[], water: None };
-        let mut bytes = encode(&surface, HeightSteps::over(300_000));
+        let mut bytes = encode(&surface, HeightSteps::over(300_000, 300_000));
         let mut next = random(seed);
         for _ in 0..changes {
             let at = 88 + next(bytes.len() as i64 - 88) as usize;
@@ -318,7 +383,7 @@ fn faults_of_a_mesh_are_found() {
         around: &[],
         water: None,
     };
-    let tile = decode(&encode(&surface, HeightSteps::over(300_000))).unwrap();
+    let tile = decode(&encode(&surface, HeightSteps::over(300_000, 300_000))).unwrap();
     let faults = [
         |tile: &mut DecodedTile| tile.triangles[0].swap(0, 1),
         |tile: &mut DecodedTile| tile.triangles.truncate(tile.triangles.len() - 1),

@@ -260,7 +260,7 @@ mod tests {
         let mut mesh = TileMesh::surroundings();
         mesh.nodes.iter_mut().zip(heights).for_each(|(node, h)| *node = Node { h, ..*node });
         let surface = Surface { tile, mesh: &mesh, outside: 0, around: &[], water };
-        gzipped_mesh(&encode(&surface, HeightSteps::over(5_000)))
+        gzipped_mesh(&encode(&surface, HeightSteps::over(5_000, 5_000)))
     }
 
     /// Writes 3 x 2 tiles of zoom 3 on one slope, with water masks, and the list of them.

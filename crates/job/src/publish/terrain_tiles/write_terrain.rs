@@ -253,8 +253,13 @@ fn degrees_of(scheme: Scheme, tiles: &[Tile]) -> [f64; 4] {
     };
     let [west, east] = ends(|tile| tile.x).map(|column| f64::from(column) * side - 180.0);
     let [south, north] = ends(|tile| tile.y).map(|row| scheme.degrees(zoom, row));
-    let turned = |degrees: f64| if degrees > 180.0 { degrees - 360.0 } else { degrees };
-    [west.max(-180.0), south, turned(east), north]
+    // Columns go on beyond the 180th meridian.
+    let turned = |degrees: f64| match degrees {
+        beyond if beyond > 180.0 => beyond - 360.0,
+        beyond if beyond < -180.0 => beyond + 360.0,
+        degrees => degrees,
+    };
+    [turned(west), south, turned(east), north]
 }
 
 /// Returns about how many bytes of memory terrain tiles take on so many threads.

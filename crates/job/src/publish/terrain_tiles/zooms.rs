@@ -140,16 +140,18 @@ impl Zoom {
 
     /// Returns the step of height that all tiles can be written with.
     pub(super) fn height_steps(&self, outside: i32) -> HeightSteps {
-        let range = |tile: &WaitingTile| {
+        let ends = |tile: &WaitingTile| {
             let [low, high] = tile.heights;
-            let [low, high] = match (low > high, tile.has_surroundings) {
+            match (low > high, tile.has_surroundings) {
                 (true, _) => [outside; 2],
                 (false, true) => [low.min(outside), high.max(outside)],
                 (false, false) => [low, high],
-            };
-            high.abs_diff(low)
+            }
         };
-        HeightSteps::over(self.tiles.iter().map(range).max().unwrap_or(0).into())
+        let ends = || self.tiles.iter().map(ends);
+        let range = ends().map(|[low, high]| high.abs_diff(low)).max().unwrap_or(0);
+        let farthest = ends().flatten().map(i32::unsigned_abs).max().unwrap_or(0);
+        HeightSteps::over(range.into(), farthest.into())
     }
 
     /// Calls `write` with each tile and the bytes of its file. `water` is the water of the zoom, if tiles tell that.
