@@ -1,4 +1,6 @@
 // The page of cesium.html: shows the tileset in its place on the globe, coarse and fine, and sends the server what it shows.
+import { answer, complaints } from './answer.js';
+
 const { Cartesian2, Cartesian3, Cartographic, Cesium3DTileset, CesiumWidget, Color, CustomShader, DirectionalLight, HeadingPitchRange, LightingModel, Math: Angles, Matrix4, Ray } = window.Cesium;
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -43,13 +45,6 @@ async function coarseError(scene, tileset) {
 function facts(scene, tileset, shown, places) {
   const triangles = [...shown].reduce((sum, tile) => sum + tile.content.trianglesLength, 0);
   return { triangles, meshes: shown.size, heights: places.map((place) => heightOver(scene, tileset, place)) };
-}
-
-// What the console says of the tileset.
-const complaints = [];
-for (const kind of ['error', 'warn']) {
-  const say = console[kind];
-  console[kind] = (...words) => { complaints.push(words.join(' ')); say.apply(console, words); };
 }
 
 // Returns what the schema of the tile at the first of `pixels` says that vertices carry, and red and green of the picture at each of them
@@ -104,10 +99,4 @@ async function show({ places, pixels }) {
   return { ...seen, centre, picture, attributes, complaints };
 }
 
-let result;
-try {
-  result = await show(await (await fetch('/request.json')).json());
-} catch (error) {
-  result = { error: String(error.stack ?? error) };
-}
-await fetch('/result', { method: 'POST', body: JSON.stringify(result) });
+await answer(show);

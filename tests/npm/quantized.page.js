@@ -3,11 +3,9 @@
 import * as THREE from 'three';
 import { TilesRenderer } from '3d-tiles-renderer';
 import { QuantizedMeshPlugin } from '3d-tiles-renderer/plugins';
+import { answer, complaints } from './answer.js';
 
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
-const complaints = [];
-const say = console.error;
-console.error = (...words) => { complaints.push(words.join(' ')); say.apply(console, words); };
 const renderer = new THREE.WebGLRenderer({ preserveDrawingBuffer: true });
 renderer.setSize(400, 300);
 document.body.append(renderer.domElement);
@@ -84,10 +82,4 @@ async function show({ places, views }) {
   return { background, off, complaints, projection: tiles.getPluginByName('QUANTIZED_MESH_PLUGIN').layer.projection, picture };
 }
 
-let result;
-try {
-  result = await show(await (await fetch('/request.json')).json());
-} catch (error) {
-  result = { error: String(error.stack ?? error) };
-}
-await fetch('/result', { method: 'POST', body: JSON.stringify(result) });
+await answer(show);

@@ -1,13 +1,9 @@
 // The page of terrain.html: shows terrain/ on a globe with imagery, and sends the server the heights and the water mask at some places, and how much of
 // the background is seen.
+import { answer, complaints } from './answer.js';
+
 const { Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color, EllipsoidTerrainProvider, HeadingPitchRange, Math: Angles, Matrix4, Rectangle, UrlTemplateImageryProvider, WebMercatorTilingScheme, sampleTerrainMostDetailed } = window.Cesium;
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
-
-const complaints = [];
-for (const kind of ['error', 'warn']) {
-  const say = console[kind];
-  console[kind] = (...words) => { complaints.push(words.join(' ')); say.apply(console, words); };
-}
 
 // A picture for all tiles of the imagery: green and brown squares.
 function picture() {
@@ -102,10 +98,4 @@ async function show({ places, views }) {
   return { off, heights, masks, background, hasWaterMask: provider.hasWaterMask, isWebMercator: provider.tilingScheme instanceof WebMercatorTilingScheme, zoom: provider.availability.computeMaximumLevelAtPosition(positions[0]), hasNormals: provider.hasVertexNormals, complaints, picture: shot };
 }
 
-let result;
-try {
-  result = await show(await (await fetch('/request.json')).json());
-} catch (error) {
-  result = { error: String(error.stack ?? error) };
-}
-await fetch('/result', { method: 'POST', body: JSON.stringify(result) });
+await answer(show);

@@ -3,6 +3,7 @@ import * as THREE from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { TilesRenderer } from '3d-tiles-renderer';
+import { answer } from './answer.js';
 
 const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
 renderer.setSize(400, 300);
@@ -117,13 +118,8 @@ async function showFile(places) {
   return facts(terrain, places, new THREE.Matrix4(), 'y');
 }
 
-let result;
-try {
-  const { places } = await (await fetch('/request.json')).json();
+await answer(async ({ places }) => {
   await MeshoptDecoder.ready;
   const file = await showFile(places);
-  result = { file, picture: picture(), ...await showTiles(places) };
-} catch (error) {
-  result = { error: String(error.stack ?? error) };
-}
-await fetch('/result', { method: 'POST', body: JSON.stringify(result) });
+  return { file, picture: picture(), ...await showTiles(places) };
+});

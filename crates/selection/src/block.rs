@@ -1,10 +1,11 @@
 //! The triangulation of what is selected, as far as it concerns the points of one block.
 
 use crate::error_bound::{Candidate, ErrorBound, VerticalError};
+use crate::mesh_of_points::{Held, MeshOfPoints, NONE, TriangleKey};
+use crate::near_points::{NearestTriangles, PointsByPlace};
 use crate::sample::Sample;
 use crate::selected_sites::{Disc, SelectedSites};
 use delaunay::geometry::predicates::orient2d;
-use delaunay::geometry::square_grid::SquareGrid;
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::mesh::index::{HalfEdgeIndex, SiteIndex};
@@ -12,8 +13,6 @@ use delaunay::mesh::insert::{insert, locate};
 use delaunay::triangulation::canonical::recycle;
 use std::cmp::Reverse;
 
-/// Stands for no point and for no triangle.
-const NONE: u32 = u32::MAX;
 /// Stands in the place of a next point where the point is selected.
 const SELECTED: u32 = u32::MAX - 1;
 
@@ -44,177 +43,6 @@ pub(crate) struct Block {
     shared: Vec<u32>,
     /// For squares of the block a triangle near it.
     near: NearestTriangles,
-}
-
-/// A triangulation with the points that lie in each triangle.
-struct MeshOfPoints {
-    sites: Vec<Site>,
-    heights: Vec<i32>,
-    mesh: HalfEdgeMesh,
-    /// By triangle.
-    held: Vec<Held>,
-    /// The triangles that have changed since the last round, some of them several times.
-    changed: Vec<u32>,
-    /// The number of triangles whose worst point exceeds the bound.
-    exceeding: usize,
-    /// The number of the present list.
-    list: u32,
-}
-
-/// The points in a triangle.
-#[derive(Clone, Copy, Debug)]
-struct Held {
-    /// The first of them.
-    first: u32,
-    /// The worst of them.
-    worst: u32,
-    /// The numerator of its distance, in two halves: the triangle takes less memory.
-    numerator: [u64; 2],
-    /// Its distance in units of [`VerticalError::fixed`] if it exceeds the bound, else 0.
-    excess: u64,
-    /// The number of the list that the triangle was last put on.
-    listed: u32,
-    /// It lies in the block, so that it holds no points of others.
-    is_inside: bool,
-}
-
-impl Held {
-    const NOTHING: Held = Held { first: NONE, worst: NONE, numerator: [0; 2], excess: 0, listed: 0, is_inside: false };
-
-    #[inline(always)]
-    fn numerator(&self) -> u128 {
-        u128::from(self.numerator[0]) << 64 | u128::from(self.numerator[1])
-    }
-
-    #[inline(always)]
-    fn set_worst(&mut self, point: u32, numerator: u128) {
-        self.worst = point;
-        self.numerator = [(numerator >> 64) as u64, numerator as u64];
-    }
-}
-
-impl MeshOfPoints {
-    /// Returns those of the triangles that have changed, from the `first` of them on, and those beside them, each once, and `more`. If as many have
-    /// changed as there are, these are all.
-    fn changed_and_beside(&mut self, first: usize, more: Vec<u32>) -> Vec<u32> {
-        self.list += 1;
-        let (held, list) = (&mut self.held, self.list);
-        if self.changed.len() - first >= held.len() {
-            held.iter_mut().for_each(|held| held.listed = list);
-            return (0..held.len() as u32).collect();
-        }
-        let mut triangles = Vec::with_capacity(more.len() + 2 * (self.changed.len() - first));
-        let mut add = |t: usize| {
-            if std::mem::replace(&mut held[t].listed, list) != list {
-                triangles.push(t as u32);
-            }
-        };
-        more.into_iter().for_each(|t| add(t as usize));
-        for &t in &self.changed[first..] {
-            add(t as usize);
-            for twin in HalfEdgeIndex::of_triangle(t as usize).map(|h| self.mesh.twin(h)) {
-                if twin != HalfEdgeIndex::HULL {
-                    add(twin.triangle());
-                }
-            }
-        }
-        triangles
-    }
-
-    /// Tells whether a triangle is on the present list.
-    fn is_listed(&self, triangle: u32) -> bool {
-        self.held[triangle as usize].listed == self.list
-    }
-
-    /// Returns the places of the corners of a triangle.
-    #[inline(always)]
-    fn corners(&self, triangle: usize) -> [Site; 3] {
-        self.mesh.triangles[triangle].map(|v| self.sites[v.get()])
-    }
-
-    /// Returns the twins of the sides of a triangle.
-    #[inline(always)]
-    fn twins_of(&self, triangle: usize) -> [HalfEdgeIndex; 3] {
-        HalfEdgeIndex::of_triangle(triangle).map(|h| self.mesh.twin(h))
-    }
-
-    /// Returns the corners of a triangle in ascending order.
-    fn key(&self, triangle: usize) -> TriangleKey {
-        let mut corners = self.corners(triangle);
-        corners.sort_unstable();
-        corners
-    }
-
-    /// Returns the distance of the worst point of a triangle in units of [`VerticalError::fixed`] if it exceeds the bound, else 0.
-    fn excess_over(&self, triangle: usize, bound: ErrorBound) -> u64 {
-        let held = &self.held[triangle];
-        if held.worst == NONE {
-            return 0;
-        }
-        let [a, b, c] = self.corners(triangle);
-        let error = VerticalError { numerator: held.numerator(), area: orient2d(a, b, c) as u64 };
-        if bound.is_exceeded_by(error) { error.fixed().max(1) } else { 0 }
-    }
-
-    /// Returns the corners of a triangle.
-    fn points(&self, triangle: usize) -> [[i32; 3]; 3] {
-        let (sites, heights) = (self.corners(triangle), self.heights(triangle));
-        [0, 1, 2].map(|k| [sites[k][0], sites[k][1], heights[k]])
-    }
-
-    /// Returns the heights of the corners of a triangle.
-    #[inline(always)]
-    fn heights(&self, triangle: usize) -> [i32; 3] {
-        self.mesh.triangles[triangle].map(|v| self.heights[v.get()])
-    }
-}
-
-/// For each square of a block, the number of a triangle in or near it.
-struct NearestTriangles {
-    grid: SquareGrid,
-    triangles: Vec<u32>,
-}
-
-impl NearestTriangles {
-    /// A square has so many points, more or less.
-    const POINTS: f64 = 24.0;
-
-    fn new(bounds: Bounds<2>, points: usize) -> NearestTriangles {
-        let grid = grid_of(bounds, points, NearestTriangles::POINTS);
-        NearestTriangles { grid, triangles: vec![0; grid.cells()] }
-    }
-
-    fn of(&self, [x, y, _]: [i32; 3]) -> u32 {
-        self.triangles[self.grid.cell(x, y)]
-    }
-
-    fn set(&mut self, [x, y, _]: [i32; 3], triangle: u32) {
-        self.triangles[self.grid.cell(x, y)] = triangle;
-    }
-}
-
-/// Returns square cells over `bounds` with `wanted` of the points in each.
-fn grid_of(bounds: Bounds<2>, points: usize, wanted: f64) -> SquareGrid {
-    let area = (bounds.extent(0) + 1) as f64 * (bounds.extent(1) + 1) as f64;
-    SquareGrid::new(bounds, (area * wanted / points.max(1) as f64).sqrt().ceil().max(1.0), 4096.0)
-}
-
-/// The points of a block row by row of small cells, to and fro.
-pub(crate) struct PointsByPlace(Vec<[i32; 3]>);
-
-impl PointsByPlace {
-    pub(crate) fn of(points: &[[i32; 3]], bounds: Bounds<2>) -> PointsByPlace {
-        let grid = grid_of(bounds, points.len(), 4.0);
-        let columns = grid.columns();
-        let key = |(i, cell): (usize, u32)| {
-            let (row, column) = (cell as usize / columns, cell as usize % columns);
-            let column = if row.is_multiple_of(2) { column } else { columns - 1 - column };
-            ((row * columns + column) as u64) << 32 | i as u64
-        };
-        let mut keys: Vec<u64> = grid.cells_of(points).into_iter().enumerate().map(key).collect();
-        radsort::sort_by_key(&mut keys, |key| (key >> 32) as u32);
-        PointsByPlace(keys.into_iter().map(|key| points[key as u32 as usize]).collect())
-    }
 }
 
 fn is_in(bounds: &Bounds<2>, point: &[i32; 3]) -> bool {
@@ -249,9 +77,6 @@ pub(crate) struct Proposal {
 pub(crate) fn far_above(bound: ErrorBound) -> u64 {
     4 * bound.fixed()
 }
-
-/// The corners of a triangle in ascending order.
-pub(crate) type TriangleKey = [Site; 3];
 
 /// The worst point that a block has of a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -315,16 +140,7 @@ impl Block {
         known.dedup();
         let sites: Vec<Site> = known.iter().map(|&[x, y, _]| [x, y]).collect();
         let mesh = triangulate(&sites)?;
-        let triangles = mesh.triangles.len();
-        let mesh = MeshOfPoints {
-            sites,
-            heights: known.iter().map(|point| point[2]).collect(),
-            mesh,
-            held: vec![Held::NOTHING; triangles],
-            changed: (0..triangles as u32).collect(),
-            exceeding: 0,
-            list: 0,
-        };
+        let mesh = MeshOfPoints::new(&known, sites, mesh);
         let of_sample = (0..points.len() as u32).filter(|&point| sample.has(points[point as usize]));
         let displaced = of_sample.map(|point| (point, NONE)).collect();
         let near = NearestTriangles::new(bounds, points.len());
@@ -538,11 +354,11 @@ impl Block {
         heights.push(point[2]);
         insert(mesh, sites, v, triangle, |t| {
             if t >= held.len() {
-                held.push(Held::NOTHING);
+                held.push(Held::on_list(0));
             }
             let mut point = held[t].first;
             *exceeding -= usize::from(held[t].excess > 0);
-            held[t] = Held { listed: held[t].listed, ..Held::NOTHING };
+            held[t] = Held::on_list(held[t].listed);
             changed.push(t as u32);
             while point != NONE {
                 displaced.push((point, t as u32));

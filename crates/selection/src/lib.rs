@@ -13,6 +13,8 @@
 mod block;
 mod error_bound;
 mod hull;
+mod mesh_of_points;
+mod near_points;
 mod regions;
 mod rounds;
 mod sample;

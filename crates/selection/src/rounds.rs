@@ -4,8 +4,10 @@
 //! until the circle of no triangle that holds its points has one ([`crate::block`]). So these triangles are those of the whole triangulation.
 //! A triangle that reaches out of a block may hold points of others: their worst points are compared.
 
-use crate::block::{Block, BlockErrors, PointsByPlace, Proposal, SharedCandidate, TriangleKey, Undecided, far_above};
+use crate::block::{Block, BlockErrors, Proposal, SharedCandidate, Undecided, far_above};
 use crate::error_bound::{Candidate, ErrorBound};
+use crate::mesh_of_points::TriangleKey;
+use crate::near_points::PointsByPlace;
 use crate::sample::{Sample, bound_of_samples, very_far_above};
 use crate::selected_sites::SelectedSites;
 use crate::source::{BlockPoints, PointSource};

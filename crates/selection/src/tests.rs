@@ -267,7 +267,7 @@ fn rounds_select_about_as_many_points_as_greedy_insertion() {
         let bound = ErrorBound::new(steps, 1);
         let mut known = SelectedSites::none(bounds, points.len() as u64);
         known.add(hull.iter().copied());
-        let all = crate::block::PointsByPlace::of(&points, bounds);
+        let all = crate::near_points::PointsByPlace::of(&points, bounds);
         let whole = Sample::all([0; 2]);
         let block = crate::block::Block::new(all, bounds, whole, &known, &hull, canonical).unwrap();
         let greedy = crate::block::greedy_insertion(block, &mut known, bound);

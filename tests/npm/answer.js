@@ -1,0 +1,19 @@
+// What the pages of these tests have in common.
+
+// Errors and warnings of the console.
+export const complaints = [];
+for (const kind of ['error', 'warn']) {
+  const say = console[kind];
+  console[kind] = (...words) => { complaints.push(words.join(' ')); say.apply(console, words); };
+}
+
+// Sends the server what `show` answers to its request, or the error.
+export async function answer(show) {
+  let result;
+  try {
+    result = await show(await (await fetch('/request.json')).json());
+  } catch (error) {
+    result = { error: String(error.stack ?? error) };
+  }
+  await fetch('/result', { method: 'POST', body: JSON.stringify(result) });
+}
