@@ -1,10 +1,10 @@
 // What the pages of these tests have in common.
 
-// Errors and warnings of the console.
-export const complaints = [];
-for (const kind of ['error', 'warn']) {
+// Errors of the console, and errors and warnings.
+export const [errors, complaints] = [[], []];
+for (const [kind, lists] of [['error', [errors, complaints]], ['warn', [complaints]]]) {
   const say = console[kind];
-  console[kind] = (...words) => { complaints.push(words.join(' ')); say.apply(console, words); };
+  console[kind] = (...words) => { lists.forEach((list) => list.push(words.join(' '))); say.apply(console, words); };
 }
 
 // Sends the server what `show` answers to its request, or the error.

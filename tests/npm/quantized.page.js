@@ -3,7 +3,7 @@
 import * as THREE from 'three';
 import { TilesRenderer } from '3d-tiles-renderer';
 import { QuantizedMeshPlugin } from '3d-tiles-renderer/plugins';
-import { answer, complaints } from './answer.js';
+import { answer, errors } from './answer.js';
 
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const renderer = new THREE.WebGLRenderer({ preserveDrawingBuffer: true });
@@ -79,7 +79,7 @@ async function show({ places, views }) {
     const hit = ray.intersectObject(tiles.group, true)[0];
     return hit ? hit.point.z - z : null;
   });
-  return { background, off, complaints, projection: tiles.getPluginByName('QUANTIZED_MESH_PLUGIN').layer.projection, picture };
+  return { background, off, complaints: errors, projection: tiles.getPluginByName('QUANTIZED_MESH_PLUGIN').layer.projection, picture };
 }
 
 await answer(show);
