@@ -14,6 +14,7 @@ use delaunay::mesh::index::SiteIndex;
 use points::Point;
 use serde::{Deserialize, Serialize};
 use sys::{Error, Result};
+use tiles::lod::relief::Relief;
 use tiles::normals::NormalSum;
 
 /// The store of a job.
@@ -415,24 +416,6 @@ impl TileSummary {
         }
     }
 
-    /// Writes the record of exact tile `tile`.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<()> {
-        ColumnWriter::default().push(&[*self]).write(store, StepRecord::Tile(tile))
-    }
-
-    /// Reads the record of exact tile `tile`.
-    ///
-    /// # Errors
-    /// [`Error::Io`], or [`Error::Broken`] if it is missing or damaged.
-    pub fn load(store: &Store, tile: TileIndex) -> Result<TileSummary> {
-        let own = ColumnReader::open(store, StepRecord::Tile(tile))?.column()?;
-        let [own] = own[..] else { return Err(Error::Broken(format!("the record of tile {tile} is damaged"))) };
-        Ok(own)
-    }
-
     /// Returns the box of the exact mesh below; `None` if it has no triangle.
     pub fn bounds(&self) -> Option<Bounds<3>> {
         box_between(self.corners)
@@ -452,6 +435,37 @@ impl TileSummary {
 
 fn box_between([min, max]: [[i32; 3]; 2]) -> Option<Bounds<3>> {
     (min[0] <= max[0]).then_some(Bounds { min, max })
+}
+
+/// What an exact tile leaves for the coarser tiles above it and for `tileset.json`.
+#[derive(Debug)]
+pub struct ExactTile {
+    /// What `tileset.json` says of it.
+    pub summary: TileSummary,
+    /// What decides how many of its vertices the coarser tile above it gets.
+    pub relief: Relief,
+}
+
+impl ExactTile {
+    /// Writes the record of `tile`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn save(&self, store: &Store, tile: TileIndex) -> Result<()> {
+        ColumnWriter::default().push(&[self.summary]).push(&[self.relief]).write(store, StepRecord::Tile(tile))
+    }
+
+    /// Reads the record of `tile`.
+    ///
+    /// # Errors
+    /// [`Error::Io`], or [`Error::Broken`] if it is missing or damaged.
+    pub fn load(store: &Store, tile: TileIndex) -> Result<ExactTile> {
+        let mut columns = ColumnReader::open(store, StepRecord::Tile(tile))?;
+        match (&columns.column()?[..], &columns.column()?[..]) {
+            (&[summary], &[relief]) => Ok(ExactTile { summary, relief }),
+            _ => Err(Error::Broken(format!("the record of tile {tile} is damaged"))),
+        }
+    }
 }
 
 /// What a coarser tile leaves for the tile above it and for `tileset.json`.

@@ -10,6 +10,10 @@ pub(crate) const BYTES_PER_LEVEL_VERTEX: u64 = 550;
 /// Bytes that the process takes, including what its allocator keeps from earlier steps.
 const KEPT: u64 = 104 << 20;
 
+/// Tiles share vertices below a tile so many levels above them. With one, the first level of woods is an eighth further from the exact mesh; with
+/// three, an update of one tile would change 64.
+const SHARED_BELOW: usize = 2;
+
 /// A child of a coarser tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ChildTile {
@@ -21,6 +25,13 @@ pub(crate) enum ChildTile {
     Coarse(usize),
 }
 
+impl ChildTile {
+    /// Returns the index of a coarser tile.
+    fn coarse(self) -> Option<usize> {
+        if let ChildTile::Coarse(at) = self { Some(at) } else { None }
+    }
+}
+
 /// A coarser tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct CoarseTile {
@@ -30,6 +41,8 @@ pub(crate) struct CoarseTile {
     pub children: Vec<ChildTile>,
     /// 1 if all children are exact tiles, else one more than the highest child.
     pub height: usize,
+    /// If all children are exact tiles: those of its kind that share their vertices with it, itself among them.
+    pub sharing: Vec<usize>,
 }
 
 /// The tiles of the tileset, or those of one part, or those above the parts.
@@ -54,7 +67,13 @@ impl LevelSizes {
     pub(crate) fn new(sites: u64, memory: u64) -> LevelSizes {
         let memory = memory.saturating_sub(KEPT).max(memory / 5).min(memory / 4 * 3);
         // Tiles have vertices on their borders besides their sites, so there is room for a fifth one.
-        LevelSizes { sites: sites.min(memory / (5 * BYTES_PER_LEVEL_VERTEX)).max(1), memory }
+        let sizes = LevelSizes { sites, memory };
+        LevelSizes { sites: sites.min(sizes.most_sites()).max(1), memory }
+    }
+
+    /// Returns the most sites of a tile of which four fit the memory together.
+    pub(crate) fn most_sites(self) -> u64 {
+        self.memory / (5 * BYTES_PER_LEVEL_VERTEX)
     }
 
     /// Returns about how many triangles a tile gets whose children together have `triangles`. Vertices along the borders come on top
@@ -80,7 +99,25 @@ impl Hierarchy {
         if !tree.nodes.is_empty() {
             builder.grow(NodeIndex::ROOT, None);
         }
-        Hierarchy { tiles: builder.tiles }
+        let mut hierarchy = Hierarchy { tiles: builder.tiles };
+        hierarchy.let_neighbours_share();
+        hierarchy
+    }
+
+    /// Lets tiles share vertices if all their children are exact and the same tile is [`SHARED_BELOW`] levels above them.
+    fn let_neighbours_share(&mut self) {
+        let mut parents: Vec<usize> = (0..self.tiles.len()).collect();
+        for (parent, tile) in self.tiles.iter().enumerate() {
+            tile.children.iter().filter_map(|child| child.coarse()).for_each(|child| parents[child] = parent);
+        }
+        let above = |index: usize| (0..SHARED_BELOW).fold(index, |index, _| parents[index]);
+        let is_lowest = |index: &usize| matches!(self.tiles[*index].children[..], [ChildTile::Exact(_), ..]);
+        let mut groups = vec![Vec::new(); self.tiles.len()];
+        let lowest = (0..self.tiles.len()).filter(|index| self.tiles[*index].height == 1).filter(is_lowest);
+        lowest.for_each(|index| groups[above(index)].push(index));
+        for group in groups {
+            group.iter().for_each(|&index| self.tiles[index].sharing = group.clone());
+        }
     }
 
     /// Returns the coarser tiles by height, lowest first: tiles of one height need only lower ones.
@@ -138,9 +175,9 @@ impl HierarchyBuilder<'_> {
     }
 
     fn add_tile(&mut self, node: NodeIndex, children: Vec<ChildTile>) -> ChildTile {
-        let coarse = |child: &ChildTile| if let ChildTile::Coarse(at) = *child { Some(&self.tiles[at]) } else { None };
-        let height = children.iter().filter_map(coarse).map(|tile| tile.height).max().unwrap_or(0) + 1;
-        self.tiles.push(CoarseTile { node, children, height });
+        let coarse = children.iter().filter_map(|child| child.coarse());
+        let height = coarse.map(|at| self.tiles[at].height).max().unwrap_or(0) + 1;
+        self.tiles.push(CoarseTile { node, children, height, sharing: Vec::new() });
         ChildTile::Coarse(self.tiles.len() - 1)
     }
 }
@@ -198,6 +235,17 @@ mod tests {
             let LevelSizes { sites, memory } = LevelSizes::new(1 << 40, memory);
             assert!(4 * (sites + sites / 10) * BYTES_PER_LEVEL_VERTEX <= memory);
         }
+    }
+
+    #[test]
+    fn sixteen_of_the_finest_share() {
+        let hierarchy = hierarchy(8, 30_000, 50_000);
+        assert_eq!(hierarchy.by_height().iter().map(Vec::len).collect::<Vec<_>>(), [64, 16, 4, 1]);
+        for (index, tile) in hierarchy.tiles.iter().enumerate() {
+            assert_eq!(tile.sharing.len(), if tile.height == 1 { 16 } else { 0 });
+            assert!(tile.height > 1 || tile.sharing.contains(&index));
+        }
+        assert_eq!(super::tests::hierarchy(2, 30_000, 50_000).tiles[0].sharing, [0]);
     }
 
     #[test]

@@ -5,9 +5,10 @@ use crate::durable::directory::JobDirectory;
 use crate::index::{NodeIndex, PartIndex};
 use crate::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, ChildTile, Hierarchy, LevelSizes};
 use crate::levels::level_mesh::{load_mesh, save_mesh};
+use crate::levels::shares::{Share, share_of};
 use crate::partition::tree::{NodeKind, Tree};
 use crate::plan::job_plan::Plan;
-use crate::records::{LevelSummary, StepRecord, Store, TileSummary};
+use crate::records::{ExactTile, LevelSummary, StepRecord, Store, TileSummary};
 use crate::tiles::style::TileStyle;
 use crate::tiles::write_tile::write_glb;
 use delaunay::geometry::{Bounds, bounds_of};
@@ -118,7 +119,8 @@ pub(crate) fn make_level(context: &LevelContext, index: usize) -> Result<(LevelS
         match memory_for(&children).filter(|bytes| *bytes <= context.sizes.memory) {
             None => stats.left_out = 1,
             Some(_) => {
-                let Level { shown, surface, working, simple } = Level::of(context, coarse.node, &children)?;
+                let share = share_of(context.store, context.hierarchy, context.sizes, index)?;
+                let Level { shown, surface, working, simple } = Level::of(context, coarse.node, &children, share)?;
                 let of_children =
                     |error: fn(&TileSummary) -> f64| children.iter().map(|c| error(&c.own)).fold(0.0, f64::max);
                 shown.bounds().into_iter().for_each(|bounds| own.draw(bounds));
@@ -183,8 +185,8 @@ struct Level {
 }
 
 impl Level {
-    /// Joins and simplifies the meshes of `children`, the tiles below `node`.
-    fn of(context: &LevelContext, node: NodeIndex, children: &[Child]) -> Result<Level> {
+    /// Joins and simplifies the meshes of `children`, the tiles below `node`, to their `share`.
+    fn of(context: &LevelContext, node: NodeIndex, children: &[Child], share: Share) -> Result<Level> {
         let vertices = children.iter().map(|child| child.own.vertices as usize).sum();
         let mut joining = Joining::new(&context.style.frame, vertices);
         for child in children.iter().filter(|child| child.own.vertices > 0) {
@@ -196,7 +198,7 @@ impl Level {
         }
         let joined = joining.finish();
         let terrain = joined.terrain();
-        let target = context.sizes.target(terrain.triangles.len());
+        let target = share.of(context.sizes.target(terrain.triangles.len()));
         let mut simple = simplify(&context.style.frame, &terrain, target, context.style.lines.as_deref())?;
         let (shown, working) = (std::mem::take(&mut simple.shown), std::mem::take(&mut simple.working));
         let surface = bounds_of(&shown.mesh.positions).ok_or_else(|| contradiction(node, &"nothing is left"))?;
@@ -238,7 +240,7 @@ impl Child {
     fn find(context: &LevelContext, child: ChildTile) -> Result<Child> {
         match child {
             ChildTile::Exact(tile) => {
-                let own = TileSummary::load(context.store, tile)?;
+                let own = ExactTile::load(context.store, tile)?.summary;
                 let path = context.directory.output().tile(tile.number());
                 Ok(Child { own, exact: true, mesh: ChildMesh::File(path) })
             }
@@ -259,7 +261,7 @@ impl Child {
         let (own, mesh) = match tree.node(NodeIndex::ROOT).kind {
             NodeKind::Leaf(tile) => {
                 let path = directory.output().tile(tile.number());
-                (TileSummary::load(store, tile)?, ChildMesh::File(path))
+                (ExactTile::load(store, tile)?.summary, ChildMesh::File(path))
             }
             NodeKind::Inner(_) => {
                 let own = LevelSummary::load(store, NodeIndex::ROOT)?.own;

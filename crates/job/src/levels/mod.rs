@@ -3,3 +3,4 @@
 pub(crate) mod hierarchy;
 mod level_mesh;
 pub(crate) mod make_level;
+mod shares;

@@ -3,7 +3,7 @@
 use crate::index::{NodeIndex, PartIndex};
 use crate::levels::hierarchy::{ChildTile, Hierarchy};
 use crate::partition::tree::{Cell, Tree};
-use crate::records::{LevelSummary, Store, TileSummary};
+use crate::records::{ExactTile, LevelSummary, Store, TileSummary};
 use delaunay::geometry::Bounds;
 use sys::Result;
 use tiles::file_names::{level_uri, tile_uri};
@@ -32,7 +32,11 @@ impl TilesOfTree<'_> {
         }
         // Few points make one tile.
         let tile = self.tree.part.tile(0);
-        Ok(node(&TileSummary::load(self.store, tile)?, &self.tree.node(NodeIndex::ROOT).cell, tile_uri(tile.number())))
+        Ok(node(
+            &ExactTile::load(self.store, tile)?.summary,
+            &self.tree.node(NodeIndex::ROOT).cell,
+            tile_uri(tile.number()),
+        ))
     }
 
     fn coarse_node(&self, index: usize) -> Result<Option<TilesetNode>> {

@@ -6,7 +6,7 @@ use crate::durable::columns::ColumnWriter;
 use crate::durable::directory::JobDirectory;
 use crate::index::TileIndex;
 use crate::merge_records::SeamOfTile;
-use crate::records::{FinishedBorder, Leaf, StepRecord, Store, TileSummary, owner};
+use crate::records::{ExactTile, FinishedBorder, Leaf, StepRecord, Store, TileSummary, owner};
 use crate::tiles::hull_slivers::HullSlivers;
 use crate::tiles::style::TileStyle;
 use crate::tiles::tile_content::{BorderOf, TileContent};
@@ -18,6 +18,7 @@ use std::path::Path;
 use sys::Result;
 use tiles::Tile;
 use tiles::gltf::glb::GlbEncoder;
+use tiles::lod::relief::Relief;
 use tiles::preview::canvas::Canvas;
 
 /// The figures of one tile, or the sum over all.
@@ -98,7 +99,8 @@ pub(crate) fn write_tile(
     pixels.extend(canvas.dots(&kept, pixels.len()));
     ColumnWriter::default().push(&pixels).write(store, StepRecord::Pixels(tile))?;
     let vertices = if kept.triangles.is_empty() { 0 } else { kept.positions.len() };
-    TileSummary::new(kept.bounds(), vertices).save(store, tile)?;
+    let relief = Relief::of(&kept.positions, &kept.triangles);
+    ExactTile { summary: TileSummary::new(kept.bounds(), vertices), relief }.save(store, tile)?;
     let mut files = Vec::new();
     if vertices > 0 {
         files.push(write_glb(&directory.output().tile(tile.number()), &kept, style)?);

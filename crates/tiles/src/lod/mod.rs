@@ -10,6 +10,7 @@ pub mod join;
 mod kept_lines;
 mod outline;
 mod refine;
+pub mod relief;
 mod rim;
 pub mod simplify;
 pub mod terrain;

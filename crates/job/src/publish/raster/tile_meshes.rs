@@ -2,7 +2,7 @@
 
 use crate::index::TileIndex;
 use crate::publish::side_files::EachTile;
-use crate::records::TileSummary;
+use crate::records::ExactTile;
 use delaunay::geometry::Bounds;
 use std::path::Path;
 use sys::{Error, Result, interrupt};
@@ -28,7 +28,7 @@ pub(crate) fn boxes(tiles: &dyn EachTile) -> Result<Vec<TileBox>> {
     let mut boxes = Vec::new();
     tiles.visit(&mut |store, tile| {
         interrupt::check()?;
-        if let Some(Bounds { min, max }) = TileSummary::load(store, tile)?.bounds() {
+        if let Some(Bounds { min, max }) = ExactTile::load(store, tile)?.summary.bounds() {
             let bounds = Bounds { min: [min[0], min[1]], max: [max[0], max[1]] };
             boxes.push(TileBox { tile, bounds, heights: [min[2], max[2]] });
         }

@@ -1,8 +1,8 @@
 //! Coarser tiles of an update: those stay whose finer tiles are as they were.
 
 use crate::Result;
-use crate::index::{NodeIndex, PartIndex};
-use crate::levels::hierarchy::{ChildTile, Hierarchy, LevelSizes};
+use crate::index::{NodeIndex, PartIndex, TileIndex};
+use crate::levels::hierarchy::{ChildTile, CoarseTile, Hierarchy, LevelSizes};
 use crate::levels::make_level::LevelStats;
 use crate::plan::job_plan::Plan;
 use crate::records::{JobStep, StepRecord};
@@ -67,16 +67,19 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
     let entries = job.entries(part)?;
     let files = entries.files(Some(JobStep::Tiles));
     let checksums: HashMap<&Path, Checksum> = files.map(|file| (file.name.as_path(), file.checksum)).collect();
+    let line_of = |tile: TileIndex| {
+        let name = job.directory.name(&job.directory.output().tile(tile.number()));
+        format!("{}\n", checksums.get(name.as_path()).map(Checksum::to_string).unwrap_or_default())
+    };
     let mut keys = vec![0u64; hierarchy.tiles.len()];
     for index in hierarchy.by_height().into_iter().flatten() {
         let mut hasher = hasher_of_levels(job, true);
-        for &child in &hierarchy.tiles[index].children {
+        let CoarseTile { children, sharing, .. } = &hierarchy.tiles[index];
+        let of_others =
+            sharing.iter().filter(|other| **other != index).flat_map(|other| &hierarchy.tiles[*other].children);
+        for &child in children.iter().chain(of_others) {
             match child {
-                ChildTile::Exact(tile) => {
-                    let name = job.directory.name(&job.directory.output().tile(tile.number()));
-                    let checksum = checksums.get(name.as_path()).map(Checksum::to_string).unwrap_or_default();
-                    hasher.update(format!("{checksum}\n").as_bytes());
-                }
+                ChildTile::Exact(tile) => hasher.update(line_of(tile).as_bytes()),
                 ChildTile::Coarse(finer) => hasher.update(&keys[finer].to_le_bytes()),
                 ChildTile::Part(part) => hasher.update(&key_of_tiles(job, part, true)?.to_le_bytes()),
             }

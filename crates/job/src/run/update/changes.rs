@@ -4,7 +4,7 @@ use crate::durable::atomic_file::{publish, remove_file, write_pending};
 use crate::durable::directory::JobDirectory;
 use crate::durable::listing::{exists, read_if_there};
 use crate::publish::side_files::EachTile;
-use crate::records::{StepRecord, Store, TileSummary};
+use crate::records::{ExactTile, StepRecord, Store};
 use crate::report::change_counts::ChangeCounts;
 use lattice::Lattice;
 use serde::Serialize;
@@ -45,7 +45,7 @@ pub(crate) fn write_changes(
     tiles.visit(&mut |store: &Store, tile| {
         let name = directory.name(&directory.output().tile(tile.number()));
         if other.contains(name.as_path()) && store.has(StepRecord::Tile(tile)) {
-            let corners = TileSummary::load(store, tile)?.bounds().map(|bounds| [bounds.min, bounds.max]);
+            let corners = ExactTile::load(store, tile)?.summary.bounds().map(|bounds| [bounds.min, bounds.max]);
             let world = |[x, y, _]: [i32; 3]| [lattice.world(0, x), lattice.world(1, y)];
             areas.extend(corners.map(|corners| corners.map(world)));
         }
