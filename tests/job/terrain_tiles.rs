@@ -270,8 +270,8 @@ fn a_tile_without_room_is_refused_at_once_and_the_limit_that_is_named_suffices()
     let limit = limit.split_once('"').unwrap().0;
     let job = crowded_job(&cloud, limit);
     stays_within(&job.report(), limit.strip_suffix(" MiB").unwrap().parse().unwrap());
-    let small = gdt_batch(job.folder(), &["verify", "out", "--memory", "16 MiB"]);
-    small.refused(1, &["not enough memory", "set --memory"]);
+    // The tile takes more than a thread's share of that, and has room alone.
+    gdt_batch(job.folder(), &["verify", "out", "--memory", "128 MiB"]).succeeded();
     job.verified();
 }
 
