@@ -60,9 +60,12 @@ mod tests {
     fn lengths_that_no_mesh_can_have_are_none() {
         let length = |packed: u64, unpacked: u32| unpacked_length(packed, unpacked.to_le_bytes());
         assert_eq!([length(1_000, 1 << 20), length(1 << 20, 1_000)], [None; 2]);
-        for bytes in
-            [vec![], vec![7], vec![7; 1 << 20], (0..1 << 16).map(|i: u32| (i * 2_654_435_761 >> 24) as u8).collect()]
-        {
+        for bytes in [
+            vec![],
+            vec![7],
+            vec![7; 1 << 20],
+            (0..1 << 16).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect(),
+        ] {
             let packed = gzipped_mesh(&bytes);
             assert_eq!(length(packed.len() as u64, bytes.len() as u32), Some(bytes.len() as u64));
         }
