@@ -10,6 +10,8 @@ use flate2::read::GzDecoder;
 use proj4rs::{Proj, transform::transform};
 use quantized_mesh::{DecodedTile, decode};
 use serde_json::Value;
+use tiles::gzip::gzipped_mesh;
+use verify::{Conclusion, verify};
 
 use crate::breaklines::{Survey, in_lake};
 use crate::clouds;
@@ -207,6 +209,161 @@ fn a_terrain_beyond_web_mercator_is_refused_at_once() {
     job("web-mercator").run().refused(2, &told);
     job("web-mercator").run_with(&["check"]).refused(2, &told);
     job("geographic").run().succeeded();
+}
+
+/// A few points beyond it are refused as early as many.
+#[test]
+fn a_terrain_partly_beyond_web_mercator_is_refused_before_it_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |north: i64| hills_in_utm(400).into_iter().map(move |[x, y, z]| [x, y + north, z]);
+    let cloud = clouds::write(folder.path(), "cloud.csv", &at(4_100_000).chain(at(4_200_000)).collect::<Vec<_>>());
+    let job = |scheme: &str, bounds: &str| {
+        let job = Job::on(&[&cloud]).with("input", &format!("crs = \"EPSG:32633\"\n{bounds}"));
+        job.with("output", &terrain_in(scheme))
+    };
+    let told = ["the terrain reaches 85.", "web mercator ends at 85.05 degrees", "fix: scheme = \"geographic\""];
+    job("web-mercator", "").run_with(&["check"]).refused(2, &told);
+    job("web-mercator", "").run().refused(2, &told);
+    job("web-mercator", "bounds = [400000.0, 9000000.0, 600000.0, 9420000.0]").run_with(&["check"]).succeeded();
+    job("geographic", "").run_with(&["check"]).succeeded();
+}
+
+/// Returns a sparse terrain of 20 km with places that have so many points each, on 900 m.
+fn crowded(places: &[[i64; 2]], points: usize) -> clouds::Cloud {
+    let mut random = Random(11);
+    let mut cloud: clouds::Cloud = (0..5_000)
+        .map(|_| {
+            [500_000 + random.below(20_000) as i64, 5_300_000 + random.below(20_000) as i64, random.below(40) as i64]
+        })
+        .collect();
+    for [east, north] in places {
+        let mut seen = std::collections::HashSet::new();
+        while seen.len() < points {
+            seen.insert([0, 1].map(|_| random.below(900) as i64));
+        }
+        cloud.extend(seen.into_iter().map(|[x, y]| [500_000 + east + x, 5_300_000 + north + y, (x + y) % 7]));
+    }
+    cloud
+}
+
+fn crowded_job(cloud: &Path, memory: &str) -> Job {
+    let job = Job::on(&[cloud]).with("input", "crs = \"EPSG:32633\"").with("output", &terrain_in("geographic"));
+    job.with("limits", &format!("memory = \"{memory}\""))
+}
+
+#[track_caller]
+fn stays_within(report: &Value, mebibytes: u64) {
+    if let Some(peak) = report["peak_memory"].as_u64() {
+        assert!(peak < mebibytes << 20, "{} MiB of {mebibytes} MiB", peak >> 20);
+    }
+}
+
+#[test]
+fn a_tile_without_room_is_refused_at_once_and_the_limit_that_is_named_suffices() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &crowded(&[[9_000, 9_000]], 600_000));
+    let told = ["[output.terrain] takes at least", "for one terrain tile", "fix: [limits] memory = \""];
+    crowded_job(&cloud, "128 MiB").run_with(&["check"]).refused(2, &told);
+    let said = crowded_job(&cloud, "128 MiB").run();
+    said.refused(2, &told);
+    let (_, limit) = said.err.rsplit_once("memory = \"").unwrap();
+    let limit = limit.split_once('"').unwrap().0;
+    let job = crowded_job(&cloud, limit);
+    stays_within(&job.report(), limit.strip_suffix(" MiB").unwrap().parse().unwrap());
+    // The tile takes more than a thread's share of that, and has room alone.
+    gdt_batch(job.folder(), &["verify", "out", "--memory", "128 MiB"]).succeeded();
+    job.verified();
+}
+
+/// Without a budget for all threads, four of them would join four great tiles at the same time.
+#[test]
+fn great_tiles_of_many_threads_keep_to_the_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [[2_000, 2_000], [14_000, 2_000], [2_000, 14_000], [14_000, 14_000]];
+    let cloud = clouds::write(folder.path(), "cloud.csv", &crowded(&places, 180_000));
+    let job = |memory: &str, threads: usize| crowded_job(&cloud, memory).threads(threads).tiles_of(20_000);
+    let tight = job("128 MiB", 4).processors(4);
+    stays_within(&tight.report(), 128);
+    let wide = job("2 GiB", 1);
+    wide.report();
+    assert!(files(&tight) == files(&wide));
+}
+
+/// Returns the bytes of a tile in which the steps of its vertices along an axis (2 is the height) are changed.
+fn forged(bytes: &[u8], axis: usize, change: impl Fn(&mut Vec<u16>)) -> Vec<u8> {
+    let mut unpacked = Vec::new();
+    GzDecoder::new(bytes).read_to_end(&mut unpacked).unwrap();
+    const COUNT_AT: usize = 88;
+    let count = u32::from_le_bytes(unpacked[COUNT_AT..][..4].try_into().unwrap()) as usize;
+    let mut values: Vec<u16> = decode(&unpacked).unwrap().vertices.iter().map(|vertex| vertex[axis]).collect();
+    change(&mut values);
+    let mut last = 0;
+    for (i, value) in values.into_iter().enumerate() {
+        let difference = i32::from(value) - last;
+        last = i32::from(value);
+        let coded = ((difference << 1) ^ (difference >> 31)) as u16;
+        unpacked[COUNT_AT + 4 + 2 * (axis * count + i)..][..2].copy_from_slice(&coded.to_le_bytes());
+    }
+    gzipped_mesh(&unpacked)
+}
+
+/// Without the list of checksums too, `verify` finds what does not fit together.
+#[test]
+fn forged_terrain_tiles_are_found_without_checksums() {
+    let survey = Survey::new(6_000);
+    for (scheme, _) in SCHEMES {
+        let job = survey.job().with("output", "height_offset = 0.0").with("output", &terrain_in(scheme));
+        job.run().succeeded();
+        fs::remove_file(job.out().join("XXH128SUMS")).unwrap();
+        let whole = files(&job);
+        // The finest tile with the most vertices, and one of its vertices on the east side.
+        let (place, tile) =
+            tiles(&whole).into_iter().max_by_key(|(place, tile)| (place[0], tile.vertices.len())).unwrap();
+        let name = format!("{}/{}/{}.terrain", place[0], place[1], place[2]);
+        let path = job.out().join("terrain").join(&name);
+        let on_side = tile.sides[2][tile.sides[2].len() / 2] as usize;
+        let found = |what: &str, words: &str| {
+            let verdict = verify(&job.out(), 1 << 28).unwrap();
+            let said = verdict.failures.join("\n");
+            assert!(verdict.verdict == Conclusion::Failed && said.contains(words), "{scheme} {what}: {verdict}");
+        };
+        assert_ne!(verify(&job.out(), 1 << 28).unwrap().verdict, Conclusion::Failed);
+        let triangle = tile.triangles.iter().max_by_key(|corners| {
+            let [a, b, c] = corners.map(|v| tile.vertices[v as usize].map(i64::from));
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        });
+        let [a, b, _] = triangle.unwrap().map(|v| v as usize);
+        let changes: [(&str, usize, &dyn Fn(&mut Vec<u16>), &str); 4] = [
+            ("a vertex in the place of another", 0, &|u| u[a] = u[b].abs_diff(1), "is no terrain tile"),
+            (
+                "heights five steps off",
+                2,
+                &|h| h.iter_mut().for_each(|h| *h = h.abs_diff(5)),
+                "do not have the same vertices",
+            ),
+            ("one height on a border", 2, &|h| h[on_side] = h[on_side].abs_diff(1), "do not have the same vertices"),
+            ("a vertex moved along a border", 1, &|v| v[on_side] = v[on_side].abs_diff(1), ""),
+        ];
+        for (what, axis, change, words) in changes {
+            fs::write(&path, forged(&whole[&name], axis, change)).unwrap();
+            found(what, words);
+        }
+        let mut unpacked = Vec::new();
+        GzDecoder::new(&whole[&name][..]).read_to_end(&mut unpacked).unwrap();
+        *unpacked.last_mut().unwrap() = 7;
+        fs::write(&path, gzipped_mesh(&unpacked)).unwrap();
+        found("a mask of other numbers", "its water mask is none");
+        fs::remove_file(&path).unwrap();
+        found("a tile less", &format!("terrain/{name} is gone"));
+        fs::write(&path, &whole[&name]).unwrap();
+        let list = job.out().join("terrain/layer.json");
+        let mut layer: Value = serde_json::from_slice(&whole["layer.json"]).unwrap();
+        layer["available"].as_array_mut().unwrap().pop();
+        fs::write(&list, layer.to_string()).unwrap();
+        found("a list without the finest zoom", "where layer.json lists");
+        fs::write(&list, &whole["layer.json"]).unwrap();
+        assert_ne!(verify(&job.out(), 1 << 28).unwrap().verdict, Conclusion::Failed);
+    }
 }
 
 /// A terrain across the 180th meridian is in both ends of the one tile of zoom 0 in web mercator.

@@ -60,7 +60,10 @@ impl Checksum {
 }
 
 /// Opens the regular file at `path` for reading. Opening a pipe would wait until another process writes to it.
-fn open_file(path: &Path) -> std::io::Result<File> {
+///
+/// # Errors
+/// As [`read_file`].
+pub fn open_file(path: &Path) -> std::io::Result<File> {
     match path.metadata()?.is_file() {
         true => File::open(path),
         false => Err(std::io::Error::other("it is not a regular file")),

@@ -33,6 +33,14 @@ fn wrapped(bytes: &[u8], deflated: &[u8]) -> Vec<u8> {
     packed
 }
 
+/// Returns how many bytes a mesh had before it was packed here, by the length and the last four bytes of what it was packed into; `None` if this cannot be.
+pub fn unpacked_length(packed: u64, end: [u8; 4]) -> Option<u64> {
+    let length = u64::from(u32::from_le_bytes(end));
+    // A byte takes a bit at least and two bytes at most, with its share of the codes of a block; the ends add some bytes.
+    const BESIDE: u64 = 1024;
+    (length / 8 <= packed && packed / 2 <= length + BESIDE).then_some(length)
+}
+
 /// Returns what was packed here; `None` if these are not such bytes, or stand for more than `most`.
 pub fn gunzipped(packed: &[u8], most: usize) -> Option<Vec<u8>> {
     let (head, rest) = packed.split_first_chunk::<HEAD>()?;
@@ -49,11 +57,28 @@ mod tests {
     use super::*;
 
     #[test]
+    fn lengths_that_no_mesh_can_have_are_none() {
+        let length = |packed: u64, unpacked: u32| unpacked_length(packed, unpacked.to_le_bytes());
+        assert_eq!([length(1_000, 1 << 20), length(1 << 20, 1_000)], [None; 2]);
+        for bytes in [
+            vec![],
+            vec![7],
+            vec![7; 1 << 20],
+            (0..1 << 16).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect(),
+        ] {
+            let packed = gzipped_mesh(&bytes);
+            assert_eq!(length(packed.len() as u64, bytes.len() as u32), Some(bytes.len() as u64));
+        }
+    }
+
+    #[test]
     fn bytes_come_back_or_are_refused() {
         let bytes: Vec<u8> = (0..5000u32).map(|i| ((i * i) >> 5) as u8).collect();
         for packed in [gzipped(&bytes, 6), gzipped_mesh(&bytes)] {
             assert_eq!(gunzipped(&packed, bytes.len()).as_ref(), Some(&bytes));
             assert_eq!(gunzipped(&packed, bytes.len() - 1), None);
+            let end = *packed.last_chunk().unwrap();
+            assert_eq!(unpacked_length(packed.len() as u64, end), Some(bytes.len() as u64));
             for at in [0, 2, 40, packed.len() - 8, packed.len() - 1] {
                 let mut damaged = packed.clone();
                 damaged[at] ^= 1;

@@ -1,10 +1,12 @@
 //! Looks into the terrain tiles for globes: whether all that `layer.json` lists are there and can be read, whether each covers its place once and has
 //! a water mask if that is listed, and whether neighbours have the same vertices between them, at the same heights to the last bit.
 //!
-//! The tiles of a zoom are read row by row, and of a row only checksums of its sides stay. So it takes little memory, however many there are.
+//! The tiles of a zoom are read row by row, and of a row only checksums of its sides stay. So it takes little memory, however many there are, and however
+//! many `layer.json` claims.
 
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -13,9 +15,9 @@ use xxhash_rust::xxh3::xxh3_128;
 
 use quantized_mesh::{DecodedTile, Scheme, decode};
 use sys::{Error, Result, disk, interrupt};
-use tiles::checksums::read_file;
+use tiles::checksums::{open_file, read_file};
 use tiles::file_names::OutputFiles;
-use tiles::gzip::gunzipped;
+use tiles::gzip::{gunzipped, unpacked_length};
 
 /// More sentences than this would hide what else is wrong.
 const MAX_SENTENCES: usize = 20;
@@ -23,8 +25,17 @@ const MAX_SENTENCES: usize = 20;
 /// Finer zooms than this are not written.
 const MOST_ZOOM: usize = 30;
 
-/// The least memory that a tile may take when it is unpacked.
-const LEAST_UNPACKED: u64 = 16 << 20;
+/// When so many tiles of the list are gone, the others are not looked for: a list may claim more of them than anybody can wait for.
+const MOST_GONE: u64 = 1000;
+
+/// Tiles that are looked for at one time.
+const TILES_AT_ONCE: usize = 1024;
+
+/// The list takes so many times as much memory as its file: its text, and its rectangles.
+const LIST_FACTOR: u64 = 4;
+
+/// What a tile holds takes so many times as much memory as its unpacked bytes, with these.
+const UNPACKED_FACTOR: u64 = 3;
 
 /// What the terrain tiles have shown.
 #[derive(Debug, Default)]
@@ -34,6 +45,8 @@ pub(super) struct TerrainTiles {
     pub(super) failures: Vec<String>,
     /// The sentences that are left out.
     more: u64,
+    /// The tiles that are listed and gone.
+    gone: u64,
 }
 
 #[derive(Deserialize)]
@@ -68,8 +81,8 @@ struct TileFiles<'a> {
     scheme: Scheme,
     /// Whether each has a water mask.
     have_water: bool,
-    /// The most bytes that one may take unpacked.
-    most: usize,
+    /// The most bytes of memory that one may take.
+    memory: u64,
 }
 
 /// A checksum of the vertices of each side of a tile: west, south, east, north.
@@ -83,23 +96,18 @@ impl TerrainTiles {
     pub(super) fn check(directory: &Path, memory: u64) -> Result<Option<TerrainTiles>> {
         let output = OutputFiles::new(directory);
         let path = output.terrain_layer();
-        let text = match read_file(&path) {
-            Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => return Ok(None),
-            text => text.map_err(Error::io("read", &path))?,
+        let text = match disk::metadata(&path).map_err(Error::io("read", &path))? {
+            None => return Ok(None),
+            Some(data) if data.len() > memory / LIST_FACTOR => return Err(too_large(&path, data.len() * LIST_FACTOR)),
+            Some(_) => read_file(&path).map_err(Error::io("read", &path))?,
         };
-        let threads = rayon::current_num_threads() as u64;
-        let most = usize::try_from((memory / 4 / threads).max(LEAST_UNPACKED)).unwrap_or(usize::MAX);
         let mut found = TerrainTiles::default();
         match serde_json::from_slice::<Layer>(&text) {
             Ok(layer) if layer.scheme().is_some_and(|scheme| is_possible(scheme, &layer.available)) => {
                 let scheme = layer.scheme().unwrap_or_default();
                 let have_water = layer.extensions.iter().any(|name| name == "watermask");
-                let files = TileFiles { output: &output, scheme, have_water, most };
-                let mut listed = 0;
-                for (zoom, rectangles) in (0u8..).zip(layer.available) {
-                    listed += found.check_zoom(&files, zoom, rectangles)?;
-                }
-                found.compare_count(&output, listed)?;
+                let files = TileFiles { output: &output, scheme, have_water, memory };
+                found.check_all(&files, layer.available)?;
             }
             _ => found.fail("terrain/layer.json is no list of terrain tiles".into()),
         }
@@ -113,38 +121,99 @@ impl TerrainTiles {
         if self.failures.len() < MAX_SENTENCES { self.failures.push(sentence) } else { self.more += 1 }
     }
 
-    /// Checks the tiles of a zoom, and returns how many are listed.
+    /// Checks all tiles that are listed, by zoom.
+    fn check_all(&mut self, files: &TileFiles, available: Vec<Vec<Rectangle>>) -> Result<()> {
+        let mut listed = 0;
+        for (zoom, rectangles) in (0u8..).zip(available) {
+            listed += self.check_zoom(files, zoom, rectangles)?;
+            if self.gone >= MOST_GONE {
+                // The last sentence, so that no other one takes its place.
+                self.failures.push(format!(
+                    "{} or more tiles that layer.json lists are gone; the others are not checked",
+                    self.gone
+                ));
+                return Ok(());
+            }
+        }
+        self.compare_count(files.output, listed)
+    }
+
+    /// Checks the tiles of a zoom, and returns how many are listed. Ends early if too many of them are gone.
     fn check_zoom(&mut self, files: &TileFiles, zoom: u8, rectangles: Vec<Rectangle>) -> Result<u64> {
         let mut listed = 0;
         let mut below: (i32, BTreeMap<i32, Sides>) = (-1, BTreeMap::new());
-        for (row, columns) in rows(rectangles) {
-            listed += columns.len() as u64;
-            let read = columns.par_iter().map(|&column| {
-                interrupt::check()?;
-                Ok((column, sides_of(files, zoom, [column, row])?))
-            });
+        for (row, runs) in rows(rectangles) {
             let mut sides: BTreeMap<i32, Sides> = BTreeMap::new();
-            for (column, of_tile) in read.collect::<Result<Vec<_>>>()? {
-                match of_tile {
-                    Ok(of_tile) => drop(sides.insert(column, of_tile)),
-                    Err(what) => self.fail(format!("{} {what}", name(zoom, [column, row]))),
+            let mut columns = runs.into_iter().flatten().peekable();
+            while columns.peek().is_some() {
+                let some: Vec<i32> = columns.by_ref().take(TILES_AT_ONCE).collect();
+                listed += some.len() as u64;
+                self.read_all(files, zoom, row, &some, &mut sides)?;
+                if self.gone >= MOST_GONE {
+                    return Ok(listed);
                 }
             }
             self.tiles += sides.len() as u64;
-            for (&column, own) in &sides {
-                // The last column is beside the first.
-                let east = (column + 1) % files.scheme.columns(zoom);
-                if sides.get(&east).is_some_and(|other| own[2] != other[0]) {
-                    self.fail(apart(zoom, [column, row], [east, row]));
-                }
-                let south = below.1.get(&column).filter(|_| below.0 + 1 == row);
-                if south.is_some_and(|other| own[1] != other[3]) {
-                    self.fail(apart(zoom, [column, row - 1], [column, row]));
-                }
-            }
+            self.compare_row(files.scheme, zoom, (row, &sides), &below);
             below = (row, sides);
         }
         Ok(listed)
+    }
+
+    /// Adds the sides of tiles of a row, and what is wrong with the tiles.
+    fn read_all(
+        &mut self,
+        files: &TileFiles,
+        zoom: u8,
+        row: i32,
+        columns: &[i32],
+        sides: &mut BTreeMap<i32, Sides>,
+    ) -> Result<()> {
+        let share = files.memory / 2 / rayon::current_num_threads() as u64;
+        let read = |&column: &i32, room: u64| {
+            interrupt::check()?;
+            read_tile(files, zoom, [column, row], room)
+        };
+        let found = columns.par_iter().map(|column| read(column, share)).collect::<Result<Vec<_>>>()?;
+        for (column, mut tile) in columns.iter().zip(found) {
+            if matches!(tile, ReadTile::TooLarge(_)) {
+                // No other thread reads one at the same time.
+                tile = read(column, files.memory)?;
+            }
+            match tile {
+                ReadTile::Whole(of_tile) => drop(sides.insert(*column, of_tile)),
+                ReadTile::Bad(what) => self.fail(format!("{} {what}", name(zoom, [*column, row]))),
+                ReadTile::Gone => {
+                    self.gone += 1;
+                    self.fail(format!("{} is gone, and layer.json lists it", name(zoom, [*column, row])));
+                }
+                ReadTile::TooLarge(bytes) => {
+                    return Err(too_large(&files.output.terrain_tile(zoom, [*column, row]), bytes));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares the sides of the tiles of a row with one another, and with those of the row below it.
+    fn compare_row(
+        &mut self,
+        scheme: Scheme,
+        zoom: u8,
+        (row, sides): (i32, &BTreeMap<i32, Sides>),
+        (row_below, below): &(i32, BTreeMap<i32, Sides>),
+    ) {
+        for (&column, own) in sides {
+            // The last column is beside the first.
+            let east = (column + 1) % scheme.columns(zoom);
+            if sides.get(&east).is_some_and(|other| own[2] != other[0]) {
+                self.fail(apart(zoom, [column, row], [east, row]));
+            }
+            let south = below.get(&column).filter(|_| row_below + 1 == row);
+            if south.is_some_and(|other| own[1] != other[3]) {
+                self.fail(apart(zoom, [column, row - 1], [column, row]));
+            }
+        }
     }
 
     /// Compares the number of tiles on the disk with that of the list.
@@ -181,8 +250,8 @@ fn is_possible(scheme: Scheme, available: &[Vec<Rectangle>]) -> bool {
     available.len() < MOST_ZOOM && (0..).zip(available).all(fits)
 }
 
-/// Returns the rows of rectangles from the south, each with its columns from the west.
-fn rows(mut rectangles: Vec<Rectangle>) -> impl Iterator<Item = (i32, Vec<i32>)> {
+/// Returns the rows of rectangles from the south, each with runs of its columns from the west.
+fn rows(mut rectangles: Vec<Rectangle>) -> impl Iterator<Item = (i32, Vec<RangeInclusive<i32>>)> {
     rectangles.sort_unstable_by_key(|rectangle| std::cmp::Reverse(rectangle.south));
     let (mut open, mut row): (Vec<Rectangle>, i32) = (Vec::new(), -1);
     std::iter::from_fn(move || {
@@ -194,11 +263,22 @@ fn rows(mut rectangles: Vec<Rectangle>) -> impl Iterator<Item = (i32, Vec<i32>)>
         while let Some(next) = rectangles.pop_if(|next| next.south == row) {
             open.push(next);
         }
-        let mut columns: Vec<i32> = open.iter().flat_map(|rectangle| rectangle.west..=rectangle.east).collect();
-        columns.sort_unstable();
-        columns.dedup();
-        Some((row, columns))
+        Some((row, runs(&open)))
     })
+}
+
+/// Returns the columns of rectangles, each once.
+fn runs(rectangles: &[Rectangle]) -> Vec<RangeInclusive<i32>> {
+    let mut ends: Vec<[i32; 2]> = rectangles.iter().map(|rectangle| [rectangle.west, rectangle.east]).collect();
+    ends.sort_unstable();
+    let mut runs: Vec<[i32; 2]> = Vec::new();
+    for [west, east] in ends {
+        match runs.last_mut() {
+            Some(last) if west <= last[1] => last[1] = last[1].max(east),
+            _ => runs.push([west, east]),
+        }
+    }
+    runs.into_iter().map(|[west, east]| west..=east).collect()
 }
 
 fn name(zoom: u8, [column, row]: [i32; 2]) -> String {
@@ -209,27 +289,63 @@ fn apart(zoom: u8, one: [i32; 2], other: [i32; 2]) -> String {
     format!("{} and {} do not have the same vertices between them", name(zoom, one), name(zoom, other))
 }
 
-/// Reads a tile, and returns the checksums of its sides, or what is wrong with it.
-fn sides_of(files: &TileFiles, zoom: u8, place: [i32; 2]) -> Result<std::result::Result<Sides, String>> {
-    let TileFiles { output, have_water, most, .. } = *files;
-    let path = output.terrain_tile(zoom, place);
-    let packed = match read_file(&path) {
+/// What has become of a tile that is listed.
+enum ReadTile {
+    Whole(Sides),
+    Gone,
+    /// What is wrong with it.
+    Bad(String),
+    /// It takes so many bytes of memory.
+    TooLarge(u64),
+}
+
+/// Reads a tile, and checks it, if that takes no more than so many bytes of memory.
+fn read_tile(files: &TileFiles, zoom: u8, place: [i32; 2], room: u64) -> Result<ReadTile> {
+    let path = files.output.terrain_tile(zoom, place);
+    let (packed, unpacked) = match lengths(&path) {
         Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
-            return Ok(Err("is gone, and layer.json lists it".into()));
+            return Ok(ReadTile::Gone);
         }
-        packed => packed.map_err(Error::io("read", &path))?,
+        lengths => lengths.map_err(Error::io("read", &path))?,
     };
-    let Some(bytes) = gunzipped(&packed, most) else {
-        return Ok(Err(format!("is damaged, or takes more than {} MiB unpacked", most >> 20)));
-    };
+    let damaged = || Ok(ReadTile::Bad("is damaged".into()));
+    let Some(unpacked) = unpacked else { return damaged() };
+    let bytes = packed.saturating_add(unpacked.saturating_mul(UNPACKED_FACTOR));
+    if bytes > room {
+        return Ok(ReadTile::TooLarge(bytes));
+    }
+    let packed = read_file(&path).map_err(Error::io("read", &path))?;
+    let Some(bytes) = gunzipped(&packed, unpacked as usize) else { return damaged() };
+    drop(packed);
     Ok(match decode(&bytes) {
         Ok(tile) => match tile.fault() {
-            Some(what) => Err(format!("is no terrain tile: {what}")),
-            None if have_water && tile.water.is_none() => Err("has no water mask, and layer.json lists that".into()),
-            None => Ok(checksums(&tile)),
+            Some(what) => ReadTile::Bad(format!("is no terrain tile: {what}")),
+            None if files.have_water && tile.water.is_none() => {
+                ReadTile::Bad("has no water mask, and layer.json lists that".into())
+            }
+            None => ReadTile::Whole(checksums(&tile)),
         },
-        Err(what) => Err(format!("is no terrain tile: {what}")),
+        Err(what) => ReadTile::Bad(format!("is no terrain tile: {what}")),
     })
+}
+
+/// Returns the length of the file of a tile, and that of what is packed in it; `None` if it is damaged.
+fn lengths(path: &Path) -> std::io::Result<(u64, Option<u64>)> {
+    let mut file = open_file(path)?;
+    let length = file.seek(SeekFrom::End(0))?;
+    let mut end = [0; 4];
+    if length < end.len() as u64 {
+        return Ok((length, None));
+    }
+    file.seek(SeekFrom::End(-(end.len() as i64)))?;
+    file.read_exact(&mut end)?;
+    Ok((length, unpacked_length(length, end)))
+}
+
+/// Returns the error about a file that takes so many bytes of memory to check.
+fn too_large(path: &Path, bytes: u64) -> Error {
+    let limit = bytes.div_ceil(1 << 20);
+    Error::Memory(format!("{} takes about {limit} MiB to verify: set --memory \"{limit} MiB\" or more", path.display()))
 }
 
 fn checksums(tile: &DecodedTile) -> Sides {
@@ -342,6 +458,62 @@ mod tests {
         assert_fails(folder.path(), 0, &["layer.json is no list"]);
     }
 
+    #[test]
+    fn a_list_of_tiles_that_nobody_can_have_ends_the_check() {
+        let folder = tempfile::tempdir().unwrap();
+        let output = written(folder.path());
+        let list = |last: [i32; 2]| {
+            let rectangle = format!(r#"{{"startX":0,"endX":{},"startY":0,"endY":{}}}"#, last[0], last[1]);
+            let zooms = vec!["[]"; 24].join(",");
+            format!(r#"{{"projection":"EPSG:3857","extensions":[],"available":[{zooms},[{rectangle}]]}}"#)
+        };
+        for last in [[(1 << 24) - 1, 0], [(1 << 24) - 1; 2], [0, (1 << 24) - 1]] {
+            fs::write(output.terrain_layer(), list(last)).unwrap();
+            let TerrainTiles { tiles, failures, gone, .. } =
+                TerrainTiles::check(folder.path(), 1 << 30).unwrap().unwrap();
+            assert!(tiles == 0 && gone < MOST_GONE + TILES_AT_ONCE as u64, "{gone}");
+            assert!(failures[0].contains("terrain/24/0/0.terrain is gone"), "{failures:?}");
+            assert!(failures.iter().any(|failure| failure.contains("the others are not checked")), "{failures:?}");
+        }
+    }
+
+    /// Returns what the check says with so much memory.
+    fn memory_error(folder: &Path, memory: u64) -> String {
+        match TerrainTiles::check(folder, memory) {
+            Err(Error::Memory(what)) => what,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn what_takes_too_much_memory_is_no_damage() {
+        let folder = tempfile::tempdir().unwrap();
+        let output = written(folder.path());
+        let mut mesh = TileMesh::surroundings();
+        mesh.nodes.extend((0..400_000).map(|i| Node {
+            u: 1 + i as u16 % 30_000,
+            v: 1 + (i / 30_000) as u16,
+            h: i % 9,
+        }));
+        mesh.triangles.extend((0..400_000).map(|i| [i, i + 1, i + 2]));
+        let great = Tile { scheme: SCHEME, zoom: 3, x: 6, y: 3 };
+        let water = Water::default();
+        let surface = Surface { tile: great, mesh: &mesh, outside: 0, around: &[], water: Some(&water) };
+        let bytes = encode(&surface, HeightSteps::over(5_000, 5_000));
+        let needed = UNPACKED_FACTOR * bytes.len() as u64;
+        fs::write(output.terrain_tile(3, [6, 3]), gzipped_mesh(&bytes)).unwrap();
+        let what = memory_error(folder.path(), needed);
+        assert!(what.contains("6/3.terrain") || what.contains("6\\3.terrain"), "{what}");
+        let (_, limit) = what.split_once("set --memory \"").unwrap();
+        let limit: u64 = limit.split_once(" MiB\"").unwrap().0.parse().unwrap();
+        // Alone it has room, whatever its neighbours are.
+        let found = TerrainTiles::check(folder.path(), limit << 20).unwrap().unwrap();
+        assert_eq!(found.tiles, 5, "{:?}", found.failures);
+        // The list takes memory too.
+        fs::write(output.terrain_layer(), vec![b' '; 1 << 20]).unwrap();
+        assert!(memory_error(folder.path(), 1 << 20).contains("layer.json takes about 4 MiB"));
+    }
+
     proptest! {
         #[test]
         fn rows_have_all_tiles_of_the_rectangles_once(
@@ -356,7 +528,7 @@ mod tests {
                 .flat_map(|all| (all.south..=all.north).flat_map(|y| (all.west..=all.east).map(move |x| [y, x])))
                 .collect();
             let found: Vec<[i32; 2]> =
-                rows(rectangles).flat_map(|(y, columns)| columns.into_iter().map(move |x| [y, x])).collect();
+                rows(rectangles).flat_map(|(y, runs)| runs.into_iter().flatten().map(move |x| [y, x])).collect();
             prop_assert_eq!(found, expected.into_iter().collect::<Vec<_>>());
         }
     }

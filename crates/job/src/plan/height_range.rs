@@ -21,7 +21,7 @@ const MOST_CHUNKS: usize = 128;
 const RECORDS: u64 = 1 << 16;
 
 /// The records at which it looks in a chunk, where there are many.
-const POINTS_OF_PLACE: usize = RECORDS as usize / MOST_CHUNKS;
+pub(crate) const POINTS_OF_PLACE: usize = RECORDS as usize / MOST_CHUNKS;
 
 /// Where an index lists the chunks within bounds, they are few, and the sample would read much of them. A share of them is enough.
 const SHARE_OF_LISTED: usize = 4;

@@ -11,6 +11,7 @@ use crate::plan::input_identity::RenamedInputs;
 use crate::plan::lattice_choice::LatticeCoarsening;
 use crate::plan::missing_attributes::missing_attributes;
 use crate::plan::plan_cut::{CutInput, PlanCut};
+use crate::plan::terrain_crowd::TerrainCrowd;
 use crate::progress::number_text::grouped;
 use breaklines::Breaklines;
 use crs::Crs;
@@ -81,6 +82,9 @@ pub struct Plan {
     /// With `surface = "bare-earth"`: how many cells the ground has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) ground_cells: Option<GroundCells>,
+    /// With `[output.terrain]`: how many vertices the most crowded tile has. Unknown in a plan that was read.
+    #[serde(skip)]
+    pub(crate) terrain_crowd: Option<TerrainCrowd>,
     /// With `max_error`: which long triangles lie on ground.
     #[serde(skip)]
     pub on_ground: GroundTriangles,

@@ -15,6 +15,7 @@ use crate::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of
 use crate::plan::ground_cells::{GroundCells, KnownCloud};
 use crate::plan::ground_triangles::GroundTriangles;
 use crate::plan::height_range::HeightSample;
+use crate::plan::height_range::POINTS_OF_PLACE;
 use crate::plan::inputs::{check_missing_records, named_inputs, open_all};
 use crate::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::plan::lattice_choice::{LatticeCoarsening, LatticeRequest, choose_lattice, fineness};
@@ -22,6 +23,7 @@ use crate::plan::measured_inputs::measured_claims;
 use crate::plan::other_unit::{refuse_other_unit, warn_of_dropped_units};
 use crate::plan::stray_heights::JobHeights;
 use crate::plan::suspect_heights::check_suspect_heights;
+use crate::plan::terrain_crowd::{SampledCloud, TerrainCrowd};
 use crate::plan::text_inputs::{
     check_malformed_rows, check_malformed_sample, farthest_row, refuse_degrees, refuse_missing_classes,
     refuse_missing_returns, row_choice, wanted_fields,
@@ -264,10 +266,21 @@ fn try_plan(
         }
         false => (sample, None),
     };
+    let crowd = SampledCloud {
+        crs: &crs,
+        frame: &frame,
+        sample: &sample.points,
+        of_place: POINTS_OF_PLACE,
+        records: decoded,
+        seen: sample.seen(),
+    };
+    let terrain_crowd = TerrainCrowd::of(&crowd, options);
+    terrain_crowd.and_then(|crowd| crowd.too_many(options)).map_or(Ok(()), |why| Err(Error::Config(why)))?;
     let heights = sample.range_within(HeightRange { low, high });
     let plan = Plan {
         claims,
         ground_cells,
+        terrain_crowd,
         on_ground: GroundTriangles::default(),
         options: options.clone(),
         inputs: Vec::new(),

@@ -39,5 +39,6 @@ pub(crate) mod rounded_box;
 pub(crate) mod stray_heights;
 pub(crate) mod stretch;
 pub(crate) mod suspect_heights;
+pub(crate) mod terrain_crowd;
 pub mod text_inputs;
 mod zero_points;

@@ -228,6 +228,7 @@ impl Preflight {
         let contours = contours.map(|sample| sample.estimate(kept));
         warnings.extend(contours.as_ref().and_then(|contours| contours.warning(plan)));
         warnings.extend(plan.ground_cells.and_then(|cells| cells.warning(options)));
+        warnings.extend(plan.terrain_crowd.and_then(|crowd| crowd.warning(options)));
         let disk = DiskEstimate::of(plan, kept, MAX_TRIANGLES_IN_ONE_FILE, contours.as_ref());
         let describe =
             |source: &Source| (source.path.display().to_string(), format!("{:?}", source.format), source.records);

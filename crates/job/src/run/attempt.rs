@@ -191,6 +191,7 @@ fn attempt(
     note_skipped(&plan.skipped, progress);
     contours_of_all.and_then(|contours| contours.warning(&plan)).iter().for_each(|warning| progress.note(warning));
     plan.ground_cells.and_then(|cells| cells.warning(options)).iter().for_each(|warning| progress.note(warning));
+    plan.terrain_crowd.and_then(|crowd| crowd.warning(options)).iter().for_each(|warning| progress.note(warning));
     let is_update = origin == PlanOrigin::Update;
     if !run.force && !is_by_tasks && !is_update {
         on_threads(threads, || require_memory_and_disk(&plan, threads, contours.as_ref()))?;

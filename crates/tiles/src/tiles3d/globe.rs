@@ -94,7 +94,10 @@ impl Globe {
     }
 
     /// Returns what [`Globe::height_offset`] does, by longitude and latitude in radians.
-    fn height_of_geoid(&self, place: [f64; 2]) -> Result<f64, NotPlaced> {
+    ///
+    /// # Errors
+    /// [`NotPlaced::Height`] if the place is outside the range of the geoid.
+    pub fn height_of_geoid(&self, place: [f64; 2]) -> Result<f64, NotPlaced> {
         // By multiplication alone, not by a function of the machine.
         let [longitude, latitude] = place.map(|radians| radians * (180.0 / std::f64::consts::PI));
         self.geoid.at(longitude, latitude).map_err(NotPlaced::Height)

@@ -2,8 +2,9 @@
 
 use crate::plan::globe_system::globe_system;
 use crate::plan::job_plan::Plan;
+use crate::plan::terrain_crowd::scheme_of;
 use crate::publish::terrain_tiles::globe_grid::Place;
-use crate::publish::terrain_tiles::limits::{beyond_latitudes, refused, scheme_of};
+use crate::publish::terrain_tiles::limits::{beyond_latitudes, refused};
 use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
 use quantized_mesh::Scheme;
@@ -33,18 +34,37 @@ pub(crate) fn globe_of(plan: &Plan) -> Result<Globe> {
 /// # Errors
 /// [`Error::Config`] if they cannot.
 pub(crate) fn check_terrain(plan: &Plan) -> Result<()> {
-    let Some(scheme) = scheme_of(plan) else { return Ok(()) };
+    let Some(scheme) = scheme_of(&plan.options) else { return Ok(()) };
     let globe = globe_of(plan)?;
-    // What headers claim may be far more than where points are, such as all of the globe. When they have been read, all of it is checked.
-    let middle = Place::of(plan, &globe, plan.extent.middle()).map_err(|why| refused(&why))?;
-    let places = corners(plan.extent).into_iter().filter_map(|corner| Place::of(plan, &globe, corner).ok());
-    let lowest = places.map(|place| place.latitude.abs()).fold(middle.latitude.abs(), f64::min).to_degrees();
-    if lowest > scheme.most_latitude() { Err(beyond_latitudes(scheme, lowest)) } else { Ok(()) }
+    Place::of(plan, &globe, plan.extent.middle()).map_err(|why| refused(&why))?;
+    // The box of all may be far more than where points are, such as around a pole. Those of the inputs decide then.
+    if highest_latitude(plan, &globe, plan.extent) <= scheme.most_latitude() {
+        return Ok(());
+    }
+    let highest = plan.inputs.iter().filter_map(|input| claimed_within(input.claimed, plan.extent));
+    let highest = highest.map(|claimed| highest_latitude(plan, &globe, claimed)).fold(0.0, f64::max);
+    if highest > scheme.most_latitude() { Err(beyond_latitudes(scheme, highest)) } else { Ok(()) }
 }
 
-/// Returns the corners of a box.
-fn corners(Bounds { min, max }: Bounds<2>) -> [[i32; 2]; 4] {
-    [min, [max[0], min[1]], [min[0], max[1]], max]
+/// Returns what a box that an input claims shares with the extent of the job.
+fn claimed_within(claimed: Bounds<2>, extent: Bounds<2>) -> Option<Bounds<2>> {
+    let min = [0, 1].map(|axis| claimed.min[axis].max(extent.min[axis]));
+    let max = [0, 1].map(|axis| claimed.max[axis].min(extent.max[axis]));
+    (0..2).all(|axis| min[axis] <= max[axis]).then_some(Bounds { min, max })
+}
+
+/// Returns the greatest latitude in a box in degrees north or south. Places that are not known do not count: a box may have corners outside of the range of
+/// a projection in which all points are.
+fn highest_latitude(plan: &Plan, globe: &Globe, bounds: Bounds<2>) -> f64 {
+    const PARTS: i64 = 32;
+    let places = grid_over(bounds, PARTS).filter_map(|place| Place::of(plan, globe, place).ok());
+    places.map(|place| place.latitude.abs().to_degrees()).fold(0.0, f64::max)
+}
+
+/// Returns places at equal distances in a box, so many times as far apart as its sides are long.
+fn grid_over(bounds: Bounds<2>, parts: i64) -> impl Iterator<Item = [i32; 2]> {
+    let along = move |axis: usize, part: i64| (i64::from(bounds.min[axis]) + bounds.extent(axis) * part / parts) as i32;
+    (0..=parts).flat_map(move |i| (0..=parts).map(move |j| [along(0, i), along(1, j)]))
 }
 
 /// Checks that a terrain within `bounds` is neither too near to a pole nor around the globe.
@@ -53,11 +73,9 @@ fn corners(Bounds { min, max }: Bounds<2>) -> [[i32; 2]; 4] {
 /// [`Error::Config`] if it is.
 pub(crate) fn check_places(plan: &Plan, globe: &Globe, scheme: Scheme, bounds: Bounds<2>) -> Result<()> {
     const PARTS: i64 = 4;
-    let along = |axis: usize, part: i64| (i64::from(bounds.min[axis]) + bounds.extent(axis) * part / PARTS) as i32;
-    let places = (0..=PARTS).flat_map(|i| (0..=PARTS).map(move |j| [along(0, i), along(1, j)]));
     let middle = Place::of(plan, globe, bounds.middle()).map_err(|why| refused(&why))?;
     let (mut highest, mut widest) = (0.0f64, 0.0f64);
-    for place in places {
+    for place in grid_over(bounds, PARTS) {
         // Corners of the box may lie outside the range of a projection in which all points are.
         let Ok(place) = Place::of(plan, globe, place) else { continue };
         highest = highest.max(place.latitude.to_degrees().abs());

@@ -1,12 +1,13 @@
 //! Where points of the lattice lie on the tiles of a zoom.
 //!
 //! To project every point takes longer than all else. So places are computed at the corners of square cells of the lattice, and between these
-//! by bilinear interpolation. A cell is a sixteenth of a tile wide at most, over which the map of a projection bends by a few hundredths of a step.
-//! Cells are those of the lattice, not of tiles of the job, so that a point has the same place in all of them.
+//! by bilinear interpolation. A cell is a sixteenth of a tile wide at most, and the middles of its sides are compared with their true places. Where the
+//! map of the projection bends more than [`MOST_BEND`] there, as it does near a pole, cells are halved until it does not. Cells are those of the lattice,
+//! not of tiles of the job, so that a point has the same place in all of them.
 
 use crate::plan::job_plan::Plan;
 use crate::publish::terrain_tiles::limits::beyond_latitudes;
-use quantized_mesh::{GridPoint, Scheme, Tile, TileGrid};
+use quantized_mesh::{GridPoint, SPAN, Scheme, Tile, TileGrid};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use sys::{Error, Result};
@@ -18,6 +19,12 @@ const CELLS_PER_TILE: f64 = 16.0;
 
 /// The longest side of a cell in metres.
 const LONGEST_CELL: f64 = 2048.0;
+
+/// The radius of the earth in metres, about.
+const RADIUS: f64 = 6_371_000.0;
+
+/// The most that places between the corners of a cell may be off, in steps of latitude: a rounding is half of one.
+const MOST_BEND: f64 = 1.0 / 16.0;
 
 /// A place on the globe.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +56,7 @@ impl Place {
 fn place_at(extras: &Extras, globe: &Globe, point: [f64; 2]) -> std::result::Result<Place, NotPlaced> {
     let [x, y] = [0, 1].map(|axis: usize| extras.offset[axis] + extras.resolution * point[axis]);
     let [longitude, latitude] = globe.geographic(x, y)?;
-    Ok(Place { longitude, latitude, offset: globe.height_offset(x, y)? })
+    Ok(Place { longitude, latitude, offset: globe.height_of_geoid([longitude, latitude])? })
 }
 
 /// The grid of a zoom over the lattice.
@@ -58,14 +65,37 @@ pub(super) struct GlobeGrid<'a> {
     globe: &'a Globe,
     scheme: Scheme,
     zoom: u8,
-    /// The side of a cell is two to the power of this, in lattice steps.
+    /// The side of the widest cells is two to the power of this, in lattice steps.
     shift: u32,
     /// A place of the terrain.
     middle: Place,
+    /// The most that places may be off, in metres.
+    most_bend: f64,
 }
 
-/// The places at the corners of a cell: south-west, south-east, north-west, north-east. `None` if one is not known.
-type Cell = Option<[Place; 4]>;
+/// What is known of a cell.
+#[derive(Clone, Copy)]
+enum Cell {
+    /// The places at its corners, between which all others are: south-west, south-east, north-west, north-east.
+    Flat([Place; 4]),
+    /// The map bends too much: its quarters decide.
+    Bent,
+    /// The place of a corner is not known.
+    Unknown,
+}
+
+/// A cell: the power of two that its side is in lattice steps, its column and its row.
+type CellNumber = (u32, [i32; 2]);
+
+/// What has been computed of the places of a tile.
+#[derive(Default)]
+struct KnownPlaces {
+    /// That of the last point, since the next one is often in it too.
+    current: Option<(CellNumber, Cell)>,
+    cells: HashMap<CellNumber, Cell>,
+    /// By lattice place, in halves of a step.
+    places: HashMap<[i64; 2], Option<Place>>,
+}
 
 impl<'a> GlobeGrid<'a> {
     /// Returns the grid of a zoom. `middle` is a place of the terrain.
@@ -74,7 +104,8 @@ impl<'a> GlobeGrid<'a> {
         let [_, height] = scheme.sides_in_metres(zoom, middle.latitude);
         let side = (height / CELLS_PER_TILE).min(LONGEST_CELL);
         let shift = (0..24).take_while(|shift| step * f64::from(2u32 << shift) <= side).count() as u32;
-        GlobeGrid { extras: plan.frame.extras(), globe, scheme, zoom, shift, middle }
+        let most_bend = height / SPAN as f64 * MOST_BEND;
+        GlobeGrid { extras: plan.frame.extras(), globe, scheme, zoom, shift, middle, most_bend }
     }
 
     /// Returns the grid points of lattice points.
@@ -82,23 +113,12 @@ impl<'a> GlobeGrid<'a> {
     /// # Errors
     /// [`Error::Config`] if the place of one is not known, or too near to a pole.
     pub(super) fn points(&self, positions: &[[i32; 3]]) -> Result<Vec<GridPoint>> {
-        let mut cells: HashMap<[i32; 2], Cell> = HashMap::new();
-        let mut corners: HashMap<[i32; 2], Option<Place>> = HashMap::new();
-        let mut current: Option<([i32; 2], Cell)> = None;
+        let mut known = KnownPlaces::default();
         let mut grid = TileGrid::new(self.scheme, self.zoom);
         let most_latitude = self.scheme.most_latitude().to_radians();
         let mut points = Vec::with_capacity(positions.len());
         for &[x, y, z] in positions {
-            let number = [x >> self.shift, y >> self.shift];
-            let cell = match current {
-                Some((last, cell)) if last == number => cell,
-                _ => *cells.entry(number).or_insert_with(|| self.cell(number, &mut corners)),
-            };
-            current = Some((number, cell));
-            let place = match cell {
-                Some(places) => self.between(places, [x, y]),
-                None => self.place([f64::from(x), f64::from(y)])?,
-            };
+            let place = self.near([x, y], &mut known)?;
             if place.latitude.abs() > most_latitude {
                 return Err(beyond_latitudes(self.scheme, place.latitude.to_degrees().abs()));
             }
@@ -121,7 +141,6 @@ impl<'a> GlobeGrid<'a> {
     /// # Errors
     /// As [`GlobeGrid::points`].
     pub(super) fn area_of_step(&self, point: [i32; 2]) -> Result<f64> {
-        const RADIUS: f64 = 6_371_000.0;
         let side = f64::from(1u32 << self.shift);
         let [x, y] = point.map(f64::from);
         let origin = self.place([x, y])?;
@@ -144,26 +163,125 @@ impl<'a> GlobeGrid<'a> {
         }
     }
 
-    fn cell(&self, [column, row]: [i32; 2], corners: &mut HashMap<[i32; 2], Option<Place>>) -> Cell {
-        let mut corner = |east: i32, north: i32| {
-            let number = [column + east, row + north];
-            *corners.entry(number).or_insert_with(|| {
-                let side = f64::from(1u32 << self.shift);
-                self.place(number.map(|along| f64::from(along) * side)).ok()
-            })
+    /// Returns the place of a lattice point, off by [`MOST_BEND`] at most.
+    fn near(&self, [x, y]: [i32; 2], known: &mut KnownPlaces) -> Result<Place> {
+        let (number, cell) = match known.current {
+            Some(((shift, number), cell)) if number == [x >> shift, y >> shift] => ((shift, number), cell),
+            _ => self.cell_of([x, y], known),
         };
-        Some([corner(0, 0)?, corner(1, 0)?, corner(0, 1)?, corner(1, 1)?])
+        known.current = Some((number, cell));
+        match cell {
+            Cell::Flat(places) => Ok(between(places, inside(number.0, [x, y]))),
+            Cell::Bent | Cell::Unknown => self.place([f64::from(x), f64::from(y)]),
+        }
     }
 
-    /// Returns the place of a point between the corners of its cell.
-    fn between(&self, [sw, se, nw, ne]: [Place; 4], point: [i32; 2]) -> Place {
-        let side = f64::from(1u32 << self.shift);
-        let [east, north] = point.map(|along| f64::from(along & ((1 << self.shift) - 1)) / side);
-        let mix = |of: fn(&Place) -> f64| {
-            let south = of(&sw) + (of(&se) - of(&sw)) * east;
-            let far = of(&nw) + (of(&ne) - of(&nw)) * east;
-            south + (far - south) * north
+    /// Returns the cell that decides about a lattice point: one that is flat, or no wider than a step.
+    fn cell_of(&self, [x, y]: [i32; 2], known: &mut KnownPlaces) -> (CellNumber, Cell) {
+        let mut shift = self.shift;
+        loop {
+            let number = (shift, [x >> shift, y >> shift]);
+            let cell = match known.cells.get(&number) {
+                Some(cell) => *cell,
+                None => {
+                    let cell = self.cell(number, &mut known.places);
+                    known.cells.insert(number, cell);
+                    cell
+                }
+            };
+            if shift == 0 || !matches!(cell, Cell::Bent) {
+                return (number, cell);
+            }
+            shift -= 1;
+        }
+    }
+
+    fn cell(&self, (shift, number): CellNumber, places: &mut HashMap<[i64; 2], Option<Place>>) -> Cell {
+        // In halves of its side.
+        let mut at = |east: i64, north: i64| {
+            let place =
+                [(number[0], east), (number[1], north)].map(|(line, half)| (2 * i64::from(line) + half) << shift);
+            *places.entry(place).or_insert_with(|| self.place(place.map(|along| along as f64 / 2.0)).ok())
         };
-        Place { longitude: mix(|p| p.longitude), latitude: mix(|p| p.latitude), offset: mix(|p| p.offset) }
+        let corners = [at(0, 0), at(2, 0), at(0, 2), at(2, 2)];
+        let sides = [at(1, 0), at(1, 2), at(0, 1), at(2, 1)];
+        let ([Some(sw), Some(se), Some(nw), Some(ne)], [Some(s), Some(n), Some(w), Some(e)]) = (corners, sides) else {
+            return Cell::Unknown;
+        };
+        let corners = [sw, se, nw, ne];
+        let off = |place: Place, share: [f64; 2]| distance(place, between(corners, share));
+        // The middle of a cell alone would not tell: in a conformal map, bends along both axes cancel out there.
+        let along = [off(s, [0.5, 0.0]).max(off(n, [0.5, 1.0])), off(w, [0.0, 0.5]).max(off(e, [1.0, 0.5]))];
+        if along[0] + along[1] <= self.most_bend { Cell::Flat(corners) } else { Cell::Bent }
+    }
+}
+
+/// Returns how far along a cell of this shift a lattice point lies, in parts of its side.
+fn inside(shift: u32, point: [i32; 2]) -> [f64; 2] {
+    let side = f64::from(1u32 << shift);
+    point.map(|along| f64::from(along & ((1 << shift) - 1)) / side)
+}
+
+/// Returns the place between the corners of a cell.
+fn between([sw, se, nw, ne]: [Place; 4], [east, north]: [f64; 2]) -> Place {
+    let mix = |of: fn(&Place) -> f64| {
+        let south = of(&sw) + (of(&se) - of(&sw)) * east;
+        let far = of(&nw) + (of(&ne) - of(&nw)) * east;
+        south + (far - south) * north
+    };
+    Place { longitude: mix(|p| p.longitude), latitude: mix(|p| p.latitude), offset: mix(|p| p.offset) }
+}
+
+/// Returns about how many metres two places near each other are apart, by their heights too.
+fn distance(a: Place, b: Place) -> f64 {
+    let scale = libm::cos(a.latitude);
+    let along = [(a.longitude - b.longitude) * scale, a.latitude - b.latitude].map(|angle| angle * RADIUS);
+    (along[0] * along[0] + along[1] * along[1]).sqrt() + (a.offset - b.offset).abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crs::geoid::Geoid;
+    use tiles::tiles3d::globe::GlobeSystem;
+
+    /// The plane around the north pole, in centimetres.
+    fn extras() -> Extras {
+        let (resolution, metres) = (0.01, 1.0);
+        Extras {
+            offset: [0.0; 3],
+            resolution,
+            resolution_z: resolution,
+            metres_per_unit: metres,
+            metres_per_unit_z: metres,
+            crs: None,
+            curvature: None,
+        }
+    }
+
+    fn around_the_pole() -> Globe {
+        let way = |[x, y]: [f64; 2]| Some([libm::atan2(x, -y), PI / 2.0 - (x * x + y * y).sqrt() / RADIUS]);
+        Globe::new(GlobeSystem { definition: String::new(), way: Box::new(way) }, 1.0, Geoid::open(None).unwrap())
+    }
+
+    #[test]
+    fn places_near_a_pole_are_where_the_projection_has_them() {
+        let (extras, globe) = (extras(), around_the_pole());
+        // 1.1 degrees from the pole, with cells of a kilometre to begin with.
+        let middle = Place { longitude: 0.0, latitude: 88.9f64.to_radians(), offset: 0.0 };
+        for zoom in [10, 14, 18] {
+            let [_, height] = Scheme::Geographic.sides_in_metres(zoom, middle.latitude);
+            let most_bend = height / SPAN as f64 * MOST_BEND;
+            let (scheme, shift) = (Scheme::Geographic, 17);
+            let grid = GlobeGrid { extras: &extras, globe: &globe, scheme, zoom, shift, middle, most_bend };
+            let (mut known, mut farthest) = (KnownPlaces::default(), 0.0f64);
+            for i in 0..20_000 {
+                let point = [i * 7_919 % 200_003 - 100_000, -12_231_200 - i * 104_729 % 300_007];
+                let exact = grid.place(point.map(f64::from)).unwrap();
+                farthest = farthest.max(distance(exact, grid.near(point, &mut known).unwrap()));
+            }
+            assert!(farthest <= most_bend, "zoom {zoom}: {farthest} m, where {most_bend} m are allowed");
+            assert!(farthest > 0.0, "zoom {zoom}: nothing is interpolated");
+        }
     }
 }

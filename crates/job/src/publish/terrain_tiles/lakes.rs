@@ -7,7 +7,12 @@ use quantized_mesh::Shore;
 use sys::Result;
 
 /// About how many bytes the shores of lakes take for a site of a breakline: an edge, and where it crosses rows of cells.
-pub(super) const BYTES_PER_SITE: u64 = 160;
+const BYTES_PER_SITE: u64 = 160;
+
+/// Returns about how many bytes the shores of the lakes of a job take.
+pub(super) fn shore_memory(plan: &Plan) -> u64 {
+    plan.breaklines.as_ref().map_or(0, |lines| lines.findings.sites) * BYTES_PER_SITE
+}
 
 /// Returns the shores of all lakes; `None` if the job has no lake.
 ///

@@ -1,17 +1,7 @@
-//! The tiling scheme of a job, and which terrains it does not take.
+//! Which terrains terrain tiles do not take.
 
-use crate::plan::job_plan::Plan;
 use quantized_mesh::Scheme;
 use sys::Error;
-use tiles::terrain_options::TerrainScheme;
-
-/// Returns the tiling scheme that the user wants, if the user wants terrain tiles.
-pub(super) fn scheme_of(plan: &Plan) -> Option<Scheme> {
-    plan.options.output.terrain.map(|terrain| match terrain.scheme {
-        TerrainScheme::Geographic => Scheme::Geographic,
-        TerrainScheme::WebMercator => Scheme::WebMercator,
-    })
-}
 
 /// Returns the error about a terrain that comes too near to a pole, up to a latitude in degrees.
 pub(super) fn beyond_latitudes(scheme: Scheme, highest: f64) -> Error {

@@ -11,5 +11,6 @@ pub(crate) mod write_terrain;
 mod globe_grid;
 mod lakes;
 mod limits;
+mod room;
 mod waiting;
 mod zooms;

@@ -2,13 +2,15 @@
 
 use crate::durable::atomic_file::{PendingFile, create_folder_of, write_pending};
 use crate::durable::directory::JobDirectory;
+use crate::plan::budget::working_memory;
 use crate::plan::job_plan::Plan;
+use crate::plan::terrain_crowd::{TerrainCrowd, scheme_of};
 use crate::publish::raster::tile_meshes::{TileBox, boxes, lattice_mesh};
 use crate::publish::side_files::EachTile;
 use crate::publish::terrain_tiles::check::{check_places, globe_of};
 use crate::publish::terrain_tiles::globe_grid::{GlobeGrid, Place};
-use crate::publish::terrain_tiles::lakes::{self, shores_of};
-use crate::publish::terrain_tiles::limits::scheme_of;
+use crate::publish::terrain_tiles::lakes::{shore_memory, shores_of};
+use crate::publish::terrain_tiles::room::Room;
 use crate::publish::terrain_tiles::waiting::WaitingRecords;
 use crate::publish::terrain_tiles::zooms::{Surroundings, WaitingPiece, Zoom};
 use crate::tiles::write_tile::TileStats;
@@ -93,7 +95,7 @@ impl<'a> TerrainWork<'a> {
         tiles: &dyn EachTile,
         stats: &'a TileStats,
     ) -> Result<Option<TerrainWork<'a>>> {
-        let Some(scheme) = scheme_of(plan) else { return Ok(None) };
+        let Some(scheme) = scheme_of(&plan.options) else { return Ok(None) };
         Ok(Some(TerrainWork { plan, scheme, frame, tiles: boxes(tiles)?, stats, globe: globe_of(plan)? }))
     }
 
@@ -125,7 +127,7 @@ impl<'a> TerrainWork<'a> {
         let shores = shores_of(self.plan, &grid(zoom))?;
         let (pieces, list) = self.cut(directory, &grid(zoom), area_of_step < 0.0, done)?;
         // Each tile is joined or selected, and written. The coarser zooms have a third as many as the finest.
-        let finest_tiles = list.iter().map(|(tile, _)| tile).collect::<HashSet<_>>().len() as u64;
+        let finest_tiles = list.iter().map(|piece| piece.tile).collect::<HashSet<_>>().len() as u64;
         let steps = ZoomSteps {
             done,
             steps: STEPS_OF_ZOOMS * self.tiles.len() as u64,
@@ -133,11 +135,13 @@ impl<'a> TerrainWork<'a> {
             finished: AtomicU64::new(0),
         };
         let finish_tile = &|| steps.finish_tile();
-        let mut finest = Zoom::finest((scheme, zoom), directory, pieces, list, finish_tile)?;
+        let room = &Room::of(self.plan);
+        let mut finest = Zoom::finest((scheme, zoom), room, directory, pieces, list, finish_tile)?;
         let surroundings = Surroundings { scheme, height: finest.mean_edge() };
         let lakes = shores.map(|shores| Lakes { shores, scheme, finest: zoom });
         let mut pyramid = Pyramid {
             directory,
+            room,
             surroundings,
             lakes,
             stats: TerrainStats::default(),
@@ -147,7 +151,7 @@ impl<'a> TerrainWork<'a> {
         pyramid.stats.surroundings = f64::from(surroundings.height) / HEIGHT_STEPS;
         let degrees = degrees_of(scheme, &finest.tiles.iter().map(|tile| tile.tile).collect::<Vec<Tile>>());
         while finest.zoom > 0 {
-            let coarser = finest.coarser(directory, surroundings, finish_tile)?;
+            let coarser = finest.coarser(room, directory, surroundings, finish_tile)?;
             pyramid.write(finest, finish_tile)?;
             finest = coarser;
         }
@@ -178,7 +182,8 @@ impl<'a> TerrainWork<'a> {
             }
             let points = grid.points(&mesh.positions)?;
             for ([x, y], piece) in cut(&points, &mesh.triangles) {
-                let piece = (grid.tile([x, y]), file.add_piece(&piece)?);
+                let vertices = piece.nodes.len() as u64;
+                let piece = WaitingPiece { tile: grid.tile([x, y]), at: file.add_piece(&piece)?, vertices };
                 list.lock().unwrap_or_else(PoisonError::into_inner).push(piece);
             }
             done(1);
@@ -199,6 +204,7 @@ struct Lakes {
 /// The zooms that are written so far, the finest first.
 struct Pyramid<'a> {
     directory: &'a JobDirectory,
+    room: &'a Room,
     surroundings: Surroundings,
     lakes: Option<Lakes>,
     stats: TerrainStats,
@@ -218,7 +224,7 @@ impl Pyramid<'_> {
         };
         let water = |lakes: &Lakes| Water::new(lakes.scheme, [zoom.zoom, lakes.finest], &lakes.shores);
         let water = self.lakes.as_ref().map(water);
-        self.files.extend(zoom.encode(self.surroundings, water.as_ref(), &write)?);
+        self.files.extend(zoom.encode(self.room, self.surroundings, water.as_ref(), &write)?);
         let tiles: Vec<Tile> = zoom.tiles.iter().map(|tile| tile.tile).collect();
         self.zooms.push(ZoomTiles::new(&tiles));
         self.stats.zooms.push(ZoomStats {
@@ -266,9 +272,9 @@ fn degrees_of(scheme: Scheme, tiles: &[Tile]) -> [f64; 4] {
 pub(crate) fn terrain_memory(plan: &Plan, threads: usize) -> u64 {
     // A tile of the job, its points on the grid and its pieces; or four tiles and the selection from them.
     const PER_THREAD: u64 = 64 << 20;
-    let sites = plan.breaklines.as_ref().map_or(0, |lines| lines.findings.sites);
+    let crowd = plan.terrain_crowd.map_or(0, TerrainCrowd::bytes);
     match plan.options.output.terrain {
-        Some(_) => threads as u64 * PER_THREAD + sites * lakes::BYTES_PER_SITE,
+        Some(_) => ((threads as u64 * PER_THREAD).max(crowd) + shore_memory(plan)).min(working_memory(&plan.options)),
         None => 0,
     }
 }

@@ -1,12 +1,13 @@
 //! The tiles of one zoom after the other.
 
 use crate::durable::directory::JobDirectory;
+use crate::plan::terrain_crowd::BYTES_PER_VERTEX;
+use crate::publish::terrain_tiles::room::{Load, Room};
 use crate::publish::terrain_tiles::waiting::WaitingRecords;
 use quantized_mesh::{
     BorderNormal, Child, HeightSteps, OUTSIDE, Scheme, Surface, Tile, TileMesh, Water, assemble, border_normals,
     coarser, encode, flat,
 };
-use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use sys::{Error, Result, interrupt};
 use tiles::gzip::gzipped_mesh;
@@ -21,6 +22,7 @@ pub(super) struct WaitingTile {
     heights: [i32; 2],
     /// Whether some vertices are not of the terrain.
     has_surroundings: bool,
+    vertices: u64,
     pub(super) triangles: u64,
     /// How far the vertices of the tiles below may be from it, in steps.
     pub(super) bound: u64,
@@ -37,8 +39,20 @@ pub(super) struct Zoom {
     file: WaitingRecords,
 }
 
-/// A piece of a tile, and its place in the file.
-pub(super) type WaitingPiece = (Tile, u64);
+/// A piece of a tile that waits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct WaitingPiece {
+    pub(super) tile: Tile,
+    /// Where it is.
+    pub(super) at: u64,
+    pub(super) vertices: u64,
+}
+
+/// Bytes that a vertex of a tile takes while the tile is written: its mesh, the same in the order of the format, normals, and the bytes.
+const BYTES_TO_WRITE: u64 = 256;
+
+/// Bytes that a vertex of the tiles below one takes while that one is made.
+const BYTES_TO_SELECT: u64 = 160;
 
 impl Zoom {
     /// Joins pieces, which may come in any order, to the tiles of the finest zoom.
@@ -47,6 +61,7 @@ impl Zoom {
     /// [`Error::Io`], [`Error::Interrupted`].
     pub(super) fn finest(
         (scheme, zoom): (Scheme, u8),
+        room: &Room,
         directory: &JobDirectory,
         pieces: WaitingRecords,
         mut list: Vec<WaitingPiece>,
@@ -54,15 +69,19 @@ impl Zoom {
     ) -> Result<Zoom> {
         list.sort_unstable();
         let file = WaitingRecords::at(&directory.scratch(&format!("terrain.{zoom}.meshes")))?;
-        let groups: Vec<&[WaitingPiece]> = list.chunk_by(|a, b| a.0 == b.0).collect();
-        let made = groups.par_iter().with_max_len(1).map(|group| {
+        let groups: Vec<&[WaitingPiece]> = list.chunk_by(|a, b| a.tile == b.tile).collect();
+        let load = |group: &&[WaitingPiece]| {
+            let vertices = group.iter().map(|piece| piece.vertices).sum::<u64>();
+            Load { tile: group[0].tile, vertices, bytes: vertices * BYTES_PER_VERTEX }
+        };
+        let made = room.share(&groups, load, |group| {
             interrupt::check()?;
-            let of_tile = group.iter().map(|(_, at)| pieces.piece(*at)).collect::<Result<Vec<_>>>()?;
-            let made = assemble(&of_tile).map(|mesh| WaitingTile::add(&file, group[0].0, &mesh, 0));
+            let of_tile = group.iter().map(|piece| pieces.piece(piece.at)).collect::<Result<Vec<_>>>()?;
+            let made = assemble(&of_tile).map(|mesh| WaitingTile::add(&file, group[0].tile, &mesh, 0));
             finish_tile();
             made.transpose()
         });
-        let tiles = made.collect::<Result<Vec<Option<WaitingTile>>>>()?.into_iter().flatten().collect();
+        let tiles = made?.into_iter().flatten().collect();
         pieces.discard()?;
         let mut finest = Zoom { scheme, zoom, tiles, file };
         finest.surround()?;
@@ -91,6 +110,7 @@ impl Zoom {
     /// [`Error::Io`], [`Error::Interrupted`].
     pub(super) fn coarser(
         &self,
+        room: &Room,
         directory: &JobDirectory,
         surroundings: Surroundings,
         finish_tile: &(dyn Fn() + Sync),
@@ -101,13 +121,17 @@ impl Zoom {
             self.tiles.iter().map(|tile| (tile.tile.parent(), tile)).collect();
         by_parent.sort_unstable_by_key(|(parent, child)| (*parent, child.tile));
         let groups: Vec<&[(Tile, &WaitingTile)]> = by_parent.chunk_by(|a, b| a.0 == b.0).collect();
-        let made = groups.par_iter().with_max_len(1).map(|group| {
+        let load = |group: &&[(Tile, &WaitingTile)]| {
+            let vertices = group.iter().map(|(_, child)| child.vertices).sum::<u64>();
+            Load { tile: group[0].0, vertices, bytes: vertices * BYTES_TO_SELECT }
+        };
+        let made = room.share(&groups, load, |group| {
             interrupt::check()?;
             let made = self.above(group, &file, surroundings.at(zoom));
             finish_tile();
             made
         });
-        let mut tiles: Vec<WaitingTile> = made.collect::<Result<_>>()?;
+        let mut tiles: Vec<WaitingTile> = made?;
         if zoom == 0 {
             for x in 0..self.scheme.columns(zoom) {
                 if !tiles.iter().any(|tile| tile.tile.column() == x) {
@@ -160,6 +184,7 @@ impl Zoom {
     /// [`Error::Io`], [`Error::Interrupted`], and those of `write`.
     pub(super) fn encode<T: Send>(
         &self,
+        room: &Room,
         surroundings: Surroundings,
         water: Option<&Water>,
         write: &(dyn Fn(Tile, Vec<u8>) -> Result<T> + Sync),
@@ -167,13 +192,16 @@ impl Zoom {
         let outside = surroundings.at(self.zoom);
         let steps = self.height_steps(outside);
         let places: HashMap<Tile, u64> = self.tiles.iter().map(|tile| (tile.tile, tile.at)).collect();
-        let encoded = self.tiles.par_iter().with_max_len(1).map(|waiting| {
+        let load = |waiting: &WaitingTile| {
+            let WaitingTile { tile, vertices, .. } = *waiting;
+            Load { tile, vertices, bytes: vertices * BYTES_TO_WRITE }
+        };
+        room.share(&self.tiles, load, |waiting| {
             interrupt::check()?;
             let (mesh, around) = (self.file.mesh(waiting.at)?, self.around(waiting.tile, &places)?);
             let surface = Surface { tile: waiting.tile, mesh: &mesh, outside, around: &around, water };
             write(waiting.tile, gzipped_mesh(&encode(&surface, steps)))
-        });
-        encoded.collect()
+        })
     }
 
     /// Returns the borders of the tiles around one.
@@ -204,8 +232,8 @@ impl WaitingTile {
         let heights = ground.fold([i32::MAX, i32::MIN], |[low, high], h| [low.min(h), high.max(h)]);
         let has_surroundings = mesh.nodes.iter().any(|node| node.h == OUTSIDE);
         let edge = if has_surroundings { edge_of(mesh) } else { [0, 0] };
-        let triangles = mesh.triangles.len() as u64;
-        Ok(WaitingTile { tile, at, heights, has_surroundings, triangles, bound, edge })
+        let [vertices, triangles] = [mesh.nodes.len(), mesh.triangles.len()].map(|count| count as u64);
+        Ok(WaitingTile { tile, at, heights, has_surroundings, vertices, triangles, bound, edge })
     }
 }
 
