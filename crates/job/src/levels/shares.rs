@@ -7,9 +7,10 @@ use crate::records::{ExactTile, Store};
 use sys::Result;
 use tiles::lod::relief::Relief;
 
-/// Of so many vertices, [`EVENLY`] are given to each tile by its size, the others to where vertices stand out furthest.
-const OF: u64 = 20;
+/// Of [`OF`] vertices so many are given to each tile by its size, the others to where vertices stand out furthest. With half of that, flat tiles have so
+/// few that viewers show exact ones in their place from twice as far.
 const EVENLY: u64 = 3;
+const OF: u64 = 10;
 
 /// The most times its own number of vertices that a tile gets.
 const MOST_TIMES: u64 = 3;
