@@ -94,6 +94,39 @@ fn errors_halve_from_depth_to_depth_also_in_a_forest() {
     }
 }
 
+/// A field on the left, a wood on the right: all tiles have as many points.
+#[test]
+fn a_wood_gets_more_triangles_than_the_field_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(6);
+    let cloud: clouds::Cloud = hills(20_000, 3)
+        .into_iter()
+        .map(|[x, y, z]| [x, y, z / 100 + if x > 10_000 && random.unit() < 0.5 { 2_000 } else { 0 }])
+        .collect();
+    let job = small(&clouds::write(folder.path(), "edge.csv", &cloud));
+    job.report();
+    job.verified();
+    let tiles = tiles(&job);
+    let is_exact = |tile: &Value| tile["children"].is_null();
+    let exact = tiles.iter().filter(|tile| is_exact(&tile.json));
+    let xs: Vec<f64> = exact.flat_map(|tile| triangles(&job, tile)).map(|t| t[0][0]).collect();
+    let middle = (xs.iter().copied().fold(f64::MAX, f64::min) + xs.iter().copied().fold(f64::MIN, f64::max)) / 2.0;
+    let lowest = tiles
+        .iter()
+        .filter(|tile| !is_exact(&tile.json) && tile.json["children"].as_array().unwrap().iter().all(is_exact));
+    // On each side the triangles of the finest coarser tiles, and those of the exact tiles below.
+    let mut sides = [[0usize; 2]; 2];
+    for tile in lowest {
+        let own = triangles(&job, tile);
+        let x: f64 = own.iter().map(|t| t[0][0]).sum::<f64>() / own.len() as f64;
+        let exact: usize = tile.leaves.iter().map(|&leaf| triangles(&job, &tiles[leaf]).len()).sum();
+        let side = &mut sides[usize::from(x > middle)];
+        *side = [side[0] + own.len(), side[1] + exact];
+    }
+    let [field, wood] = sides.map(|[own, exact]| own as f64 / exact as f64);
+    assert!(wood > 2.0 * field && (0.15..0.25).contains(&((wood + field) / 2.0)), "{sides:?}");
+}
+
 /// Asserts that coarser tiles cover the ground of their leaves and little more, and that there is no gap between them and what is around them:
 /// only the lower ends of their skirts have nothing beside them.
 pub(crate) fn coarser_tiles_cover_their_leaves(job: &Job, tiles: &[Tile]) {

@@ -42,7 +42,7 @@ pub(crate) fn share_of(store: &Store, hierarchy: &Hierarchy, sizes: LevelSizes, 
         let exact = hierarchy.tiles[near].children.iter().filter_map(|&child| exact(child));
         let (relief, vertices) = of_exact(store, exact)?;
         let even = sizes.target(2 * vertices as usize) as u64 / 2;
-        all += &relief;
+        all.add(&relief);
         wanted += even;
         if near == index {
             own = (relief, even);
@@ -67,7 +67,7 @@ fn of_exact(store: &Store, tiles: impl Iterator<Item = TileIndex>) -> Result<(Re
     let (mut all, mut vertices) = (Relief::default(), 0);
     for tile in tiles {
         let ExactTile { summary, relief } = ExactTile::load(store, tile)?;
-        all += &relief;
+        all.add(&relief);
         vertices += u64::from(summary.vertices);
     }
     Ok((all, vertices))

@@ -1,7 +1,6 @@
 //! How far the vertices of a tile stand out of the mesh around them. Where many stand out far, a coarser tile needs many vertices.
 
 use bytemuck::{Pod, Zeroable};
-use std::ops::AddAssign;
 
 /// The numbers of bits that are told apart; distances with more belong to the last.
 const BITS: usize = 32;
@@ -35,6 +34,11 @@ impl Relief {
         relief
     }
 
+    /// Adds the vertices of another tile.
+    pub fn add(&mut self, other: &Relief) {
+        self.by_bits.iter_mut().zip(other.by_bits).for_each(|(sum, other)| *sum = sum.saturating_add(other));
+    }
+
     /// Returns the share of `own` if the `count` vertices of `all` that stand out furthest are chosen, with as many of each tile from the last
     /// ones that are equally far.
     pub fn share(own: &Relief, all: &Relief, count: u64) -> u64 {
@@ -48,12 +52,6 @@ impl Relief {
             left -= all;
         }
         share
-    }
-}
-
-impl AddAssign<&Relief> for Relief {
-    fn add_assign(&mut self, other: &Relief) {
-        self.by_bits.iter_mut().zip(other.by_bits).for_each(|(sum, other)| *sum = sum.saturating_add(other));
     }
 }
 
@@ -89,7 +87,7 @@ mod tests {
         };
         let (wood, field) = (relief(&[(10, 80), (5, 20)]), relief(&[(5, 60), (0, 40)]));
         let mut all = wood;
-        all += &field;
+        all.add(&field);
         assert_eq!([40, 80, 120, 200, 300].map(|count| Relief::share(&wood, &all, count)), [40, 80, 90, 100, 100]);
         assert_eq!([40, 80, 120, 200, 300].map(|count| Relief::share(&field, &all, count)), [0, 0, 30, 100, 100]);
     }
