@@ -333,7 +333,9 @@ fn forged_terrain_tiles_are_found_without_checksums() {
             (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         });
         let [a, b, _] = triangle.unwrap().map(|v| v as usize);
-        let changes: [(&str, usize, &dyn Fn(&mut Vec<u16>), &str); 4] = [
+        // What is done, to which axis, and what `verify` writes of it.
+        type Forgery<'a> = (&'a str, usize, &'a dyn Fn(&mut Vec<u16>), &'a str);
+        let changes: [Forgery; 4] = [
             ("a vertex in the place of another", 0, &|u| u[a] = u[b].abs_diff(1), "is no terrain tile"),
             (
                 "heights five steps off",
