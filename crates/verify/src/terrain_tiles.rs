@@ -31,8 +31,8 @@ const MOST_GONE: u64 = 1000;
 /// Tiles that are looked for at one time.
 const TILES_AT_ONCE: usize = 1024;
 
-/// The list takes so many times as much memory as its file: its text, and its rectangles.
-const LIST_FACTOR: u64 = 4;
+/// The list takes so many times as much memory as its file at most: three bytes of it may be an empty list in a list.
+const LIST_FACTOR: u64 = 20;
 
 /// What a tile holds takes so many times as much memory as its unpacked bytes, with these.
 const UNPACKED_FACTOR: u64 = 3;

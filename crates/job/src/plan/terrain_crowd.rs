@@ -11,10 +11,18 @@ use delaunay::geometry::Site;
 use quantized_mesh::{SPAN, Scheme, TileGrid, finest_zoom};
 use std::collections::{HashMap, HashSet};
 use tiles::frame::Frame;
+use tiles::options::MaxEdge;
 use tiles::terrain_options::TerrainScheme;
 
 /// Bytes that a vertex takes, with its triangles, while its tile is joined from pieces: most of all where rounding has folded triangles.
 pub(crate) const BYTES_PER_VERTEX: u64 = 448;
+
+/// Bytes that a vertex of the tiles below one takes while that one is made.
+pub(crate) const BYTES_TO_SELECT: u64 = 160;
+
+/// Bytes that the process has by then, and those that each thread takes besides its tile.
+const PROCESS: u64 = 72 << 20;
+const PER_THREAD: u64 = 8 << 20;
 
 /// A tile where fewer places of the sample have points tells nothing for sure.
 const SURE_PLACES: usize = 4;
@@ -73,10 +81,19 @@ impl TerrainCrowd {
         let whole = box_area(placed.iter().map(|(_, site, _)| *site)) * cloud.frame.resolution_metres()[0].powi(2);
         // A terrain covers at least half of its box. In less area, tiles are smaller.
         let [fine, coarse] = [whole / 2.0, whole].map(|area| finest_zoom(scheme, area, all, latitude));
-        let most = |zoom: u8| most_in_a_tile((scheme, zoom), &placed, (times, cloud.of_place));
+        let most = |zoom: u8| {
+            let of_zoom = |zoom: u8| most_in_a_tile((scheme, zoom), &placed, (times, cloud.of_place));
+            // The tile above takes less for each vertex, and may have those of four.
+            let above =
+                of_zoom(zoom.saturating_sub(1)).map(|most| most * (BYTES_TO_SELECT as f64 / BYTES_PER_VERTEX as f64));
+            let own = of_zoom(zoom);
+            [own[0].max(above[0]), own[1].max(above[1])]
+        };
         let ([_, least], [about, _]) = (most(fine), most(coarse));
-        // Which points are vertices is not known then.
-        let least = if options.leaves_points_out() { 0.0 } else { least * SURELY };
+        // Which points are vertices is not known then, or which of the ground is terrain.
+        let is_whole = options.output.max_edge == MaxEdge::default() && options.input.clip.is_none();
+        let is_sure = is_whole && !options.leaves_points_out();
+        let least = if is_sure { least * SURELY } else { 0.0 };
         Some(TerrainCrowd { least: least as u64, about: (about * POSSIBLY) as u64 })
     }
 
@@ -84,11 +101,11 @@ impl TerrainCrowd {
     pub(crate) fn too_many(self, options: &JobOptions) -> Option<String> {
         (!has_room(options, self.least)).then(|| {
             format!(
-                "[output.terrain] takes at least {} for one terrain tile with {} points or more, more than [limits] memory = \"{}\" allows; fix: {}",
+                "[output.terrain] takes at least {} for one terrain tile with at least {} points: [limits] memory = \"{}\" has no room for it; fix: {}",
                 mebibytes(bytes_of(self.least)),
                 grouped(self.least),
                 options.limits.memory,
-                self.remedy()
+                self.remedy(options)
             )
         })
     }
@@ -97,12 +114,12 @@ impl TerrainCrowd {
     pub(crate) fn warning(self, options: &JobOptions) -> Option<String> {
         (!has_room(options, self.about)).then(|| {
             format!(
-                "[output.terrain] may stop for lack of memory: one terrain tile has up to about {} vertices, which take {}, more than [limits] \
-                 memory = \"{}\" allows; fix: {}",
+                "[output.terrain] may stop for lack of memory: one terrain tile has up to about {} vertices, which take {}: [limits] memory = \
+                 \"{}\" may have no room for them; fix: {}",
                 grouped(self.about),
                 mebibytes(bytes_of(self.about)),
                 options.limits.memory,
-                self.remedy()
+                self.remedy(options)
             )
         })
     }
@@ -112,21 +129,33 @@ impl TerrainCrowd {
         bytes_of(self.about)
     }
 
-    fn remedy(self) -> String {
-        remedy(bytes_of(self.about.max(self.least)))
+    fn remedy(self, options: &JobOptions) -> String {
+        remedy(bytes_of(self.about.max(self.least)), beside(options))
     }
 }
 
-/// Returns what a user can do about a tile that takes so many bytes.
-pub(crate) fn remedy(bytes: u64) -> String {
+/// Returns what a user can do about a tile that takes so many bytes, where so many are taken beside it.
+pub(crate) fn remedy(bytes: u64, beside: u64) -> String {
+    // Three quarters of a limit are for work.
+    let working = bytes.max(bytes.saturating_add(beside).div_ceil(4).saturating_mul(3));
     format!(
         "[limits] memory = \"{}\", or fewer points where they are densest, for example by [output] max_error or without the files of that place",
-        limit_for(bytes)
+        limit_for(working)
     )
 }
 
+/// Returns the bytes that are taken beside terrain tiles.
+pub(crate) fn beside(options: &JobOptions) -> u64 {
+    PROCESS + PER_THREAD * options.threads() as u64
+}
+
+/// Returns the bytes that terrain tiles may take at one time.
+pub(crate) fn room_for_tiles(options: &JobOptions) -> u64 {
+    working_memory(options).min(options.limits.memory.0.saturating_sub(beside(options)))
+}
+
 fn has_room(options: &JobOptions, vertices: u64) -> bool {
-    bytes_of(vertices) <= working_memory(options)
+    bytes_of(vertices) <= room_for_tiles(options)
 }
 
 fn bytes_of(vertices: u64) -> u64 {

@@ -7,7 +7,6 @@ use crate::publish::terrain_tiles::globe_grid::Place;
 use crate::publish::terrain_tiles::limits::{beyond_latitudes, refused};
 use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
-use quantized_mesh::Scheme;
 use sys::{Error, Result};
 use tiles::tiles3d::globe::Globe;
 
@@ -67,23 +66,23 @@ fn grid_over(bounds: Bounds<2>, parts: i64) -> impl Iterator<Item = [i32; 2]> {
     (0..=parts).flat_map(move |i| (0..=parts).map(move |j| [along(0, i), along(1, j)]))
 }
 
-/// Checks that a terrain within `bounds` is neither too near to a pole nor around the globe.
+/// Checks that a terrain whose tiles lie within `boxes` around `middle` is not around the globe. How near it is to a pole, each point tells.
 ///
 /// # Errors
 /// [`Error::Config`] if it is.
-pub(crate) fn check_places(plan: &Plan, globe: &Globe, scheme: Scheme, bounds: Bounds<2>) -> Result<()> {
-    const PARTS: i64 = 4;
-    let middle = Place::of(plan, globe, bounds.middle()).map_err(|why| refused(&why))?;
-    let (mut highest, mut widest) = (0.0f64, 0.0f64);
-    for place in grid_over(bounds, PARTS) {
-        // Corners of the box may lie outside the range of a projection in which all points are.
-        let Ok(place) = Place::of(plan, globe, place) else { continue };
-        highest = highest.max(place.latitude.to_degrees().abs());
-        widest = widest.max(2.0 * (place.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs());
-    }
-    if highest > scheme.most_latitude() {
-        return Err(beyond_latitudes(scheme, highest));
-    }
+pub(super) fn check_longitudes(
+    plan: &Plan,
+    globe: &Globe,
+    middle: &Place,
+    boxes: impl Iterator<Item = Bounds<2>>,
+) -> Result<()> {
+    const PARTS: i64 = 2;
+    // Corners of a box may lie outside the range of a projection in which all points are.
+    let places =
+        boxes.flat_map(|bounds| grid_over(bounds, PARTS)).filter_map(|place| Place::of(plan, globe, place).ok());
+    let widest = places
+        .map(|place| 2.0 * (place.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs())
+        .fold(0.0, f64::max);
     if widest > MOST_LONGITUDES {
         return Err(refused(&format!(
             "the terrain spans about {widest:.0} degrees of longitude; {MOST_LONGITUDES} degrees is the limit"

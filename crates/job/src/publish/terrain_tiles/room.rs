@@ -1,8 +1,7 @@
 //! Which tiles of a zoom are worked on at the same time, so that they fit the memory together.
 
-use crate::plan::budget::working_memory;
 use crate::plan::job_plan::Plan;
-use crate::plan::terrain_crowd::remedy;
+use crate::plan::terrain_crowd::{beside, remedy, room_for_tiles};
 use crate::progress::number_text::{grouped, mebibytes};
 use crate::publish::terrain_tiles::lakes::shore_memory;
 use quantized_mesh::Tile;
@@ -13,8 +12,9 @@ use sys::{Error, Result};
 /// The memory that terrain tiles may take.
 pub(super) struct Room {
     bytes: u64,
-    /// What the shores of lakes take besides.
+    /// What the shores of lakes take besides, and what is taken beside both.
     shores: u64,
+    beside: u64,
     /// The limit of the user.
     limit: String,
 }
@@ -30,12 +30,12 @@ impl Room {
     /// Returns the room in the job of `plan`.
     pub(super) fn of(plan: &Plan) -> Room {
         let shores = shore_memory(plan);
-        let bytes = working_memory(&plan.options).saturating_sub(shores);
-        Room { bytes, shores, limit: plan.options.limits.memory.to_string() }
+        let bytes = room_for_tiles(&plan.options).saturating_sub(shores);
+        Room { bytes, shores, beside: beside(&plan.options), limit: plan.options.limits.memory.to_string() }
     }
 
-    /// Calls `work` with all of `items`, each of which takes `load`: on all threads as long as these are small, and on fewer for great ones. Returns the
-    /// results in the order of the items.
+    /// Calls `work` with all of `items`, each of which takes `load`: on all threads as long as these are small, and on fewer for great ones. What comes
+    /// after that may take `later` bytes. Returns the results in the order of the items.
     ///
     /// # Errors
     /// [`Error::Config`] if there is no room for one of them alone, and those of `work`.
@@ -43,10 +43,12 @@ impl Room {
         &self,
         items: &[T],
         load: impl Fn(&T) -> Load,
+        later: u64,
         work: impl Fn(&T) -> Result<R> + Sync,
     ) -> Result<Vec<R>> {
         let loads: Vec<Load> = items.iter().map(load).collect();
-        loads.iter().find(|load| load.bytes > self.bytes).map_or(Ok(()), |load| Err(self.too_great(load)))?;
+        let greatest = loads.iter().max_by_key(|load| load.bytes).filter(|load| load.bytes > self.bytes);
+        greatest.map_or(Ok(()), |load| Err(self.too_great(load, later)))?;
         let bytes: Vec<u64> = loads.iter().map(|load| load.bytes).collect();
         let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
         for batch in batches(&bytes, self.bytes, rayon::current_num_threads() as u64) {
@@ -56,16 +58,16 @@ impl Room {
         Ok(results.into_iter().flatten().collect())
     }
 
-    fn too_great(&self, Load { tile, vertices, bytes }: &Load) -> Error {
+    fn too_great(&self, Load { tile, vertices, bytes }: &Load, later: u64) -> Error {
         Error::Config(format!(
-            "[output.terrain] takes {} for the terrain tile {}/{}/{} with {} vertices, more than [limits] memory = \"{}\" allows; fix: {}",
+            "[output.terrain] takes {} for the terrain tile {}/{}/{} with {} vertices: [limits] memory = \"{}\" has no room for it; fix: {}",
             mebibytes(*bytes),
             tile.zoom,
             tile.column(),
             tile.y,
             grouped(*vertices),
             self.limit,
-            remedy(bytes.saturating_add(self.shores))
+            remedy((*bytes).max(later).saturating_add(self.shores), self.beside)
         ))
     }
 }
@@ -109,10 +111,18 @@ mod tests {
 
     #[test]
     fn results_come_in_the_order_of_the_items_and_one_without_room_is_refused() {
-        let room = Room { bytes: 100, shores: 0, limit: "1 MiB".into() };
+        let room = Room { bytes: 100, shores: 0, beside: 0, limit: "1 MiB".into() };
         let items = [5u64, 80, 7, 99, 60, 1];
-        assert_eq!(room.share(&items, |item| load(*item), |item| Ok(item * 2)).unwrap(), items.map(|item| item * 2));
-        let why = room.share(&[5u64, 101], |item| load(*item), |item| Ok(*item)).unwrap_err().to_string();
-        assert!(why.contains("the terrain tile 12/4/3 with ") && why.contains("memory = \"64 MiB\""), "{why}");
+        let doubled = room.share(&items, |item| load(*item), 0, |item| Ok(item * 2)).unwrap();
+        assert_eq!(doubled, items.map(|item| item * 2));
+        let why = |sizes: &[u64], later: u64| {
+            let none = room.share(sizes, |bytes| load(*bytes), later, |bytes| Ok(*bytes));
+            none.unwrap_err().to_string()
+        };
+        let of_one = why(&[5, 101], 0);
+        assert!(of_one.contains("the terrain tile 12/4/3 with ") && of_one.contains("memory = \"64 MiB\""), "{of_one}");
+        // The limit that is named has room for the greatest, and for what comes after it.
+        assert!(why(&[101, 190 << 20, 5], 0).contains("memory = \"256 MiB\""));
+        assert!(why(&[101], 190 << 20).contains("memory = \"256 MiB\""));
     }
 }

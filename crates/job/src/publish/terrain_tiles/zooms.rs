@@ -1,7 +1,7 @@
 //! The tiles of one zoom after the other.
 
 use crate::durable::directory::JobDirectory;
-use crate::plan::terrain_crowd::BYTES_PER_VERTEX;
+use crate::plan::terrain_crowd::{BYTES_PER_VERTEX, BYTES_TO_SELECT};
 use crate::publish::terrain_tiles::room::{Load, Room};
 use crate::publish::terrain_tiles::waiting::WaitingRecords;
 use quantized_mesh::{
@@ -51,8 +51,12 @@ pub(super) struct WaitingPiece {
 /// Bytes that a vertex of a tile takes while the tile is written: its mesh, the same in the order of the format, normals, and the bytes.
 const BYTES_TO_WRITE: u64 = 256;
 
-/// Bytes that a vertex of the tiles below one takes while that one is made.
-const BYTES_TO_SELECT: u64 = 160;
+/// Returns the bytes that the greatest tile of the zoom before that of these pieces takes while it is made, at most.
+fn to_select(pieces: &[WaitingPiece]) -> u64 {
+    let mut vertices: HashMap<Tile, u64> = HashMap::new();
+    pieces.iter().for_each(|piece| *vertices.entry(piece.tile.parent()).or_default() += piece.vertices);
+    vertices.into_values().max().unwrap_or(0) * BYTES_TO_SELECT
+}
 
 impl Zoom {
     /// Joins pieces, which may come in any order, to the tiles of the finest zoom.
@@ -74,7 +78,7 @@ impl Zoom {
             let vertices = group.iter().map(|piece| piece.vertices).sum::<u64>();
             Load { tile: group[0].tile, vertices, bytes: vertices * BYTES_PER_VERTEX }
         };
-        let made = room.share(&groups, load, |group| {
+        let made = room.share(&groups, load, to_select(&list), |group| {
             interrupt::check()?;
             let of_tile = group.iter().map(|piece| pieces.piece(piece.at)).collect::<Result<Vec<_>>>()?;
             let made = assemble(&of_tile).map(|mesh| WaitingTile::add(&file, group[0].tile, &mesh, 0));
@@ -125,7 +129,7 @@ impl Zoom {
             let vertices = group.iter().map(|(_, child)| child.vertices).sum::<u64>();
             Load { tile: group[0].0, vertices, bytes: vertices * BYTES_TO_SELECT }
         };
-        let made = room.share(&groups, load, |group| {
+        let made = room.share(&groups, load, 0, |group| {
             interrupt::check()?;
             let made = self.above(group, &file, surroundings.at(zoom));
             finish_tile();
@@ -196,7 +200,7 @@ impl Zoom {
             let WaitingTile { tile, vertices, .. } = *waiting;
             Load { tile, vertices, bytes: vertices * BYTES_TO_WRITE }
         };
-        room.share(&self.tiles, load, |waiting| {
+        room.share(&self.tiles, load, 0, |waiting| {
             interrupt::check()?;
             let (mesh, around) = (self.file.mesh(waiting.at)?, self.around(waiting.tile, &places)?);
             let surface = Surface { tile: waiting.tile, mesh: &mesh, outside, around: &around, water };
