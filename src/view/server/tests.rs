@@ -341,10 +341,13 @@ fn clients_that_never_read_lose_their_places() {
     std::fs::File::create(rig.out().join("large.glb")).unwrap().set_len(LARGE).unwrap();
     let still: Vec<TcpStream> = (0..MOST_CONNECTIONS).map(|_| asks_for_much(&rig)).collect();
     assert_eq!(rig.get("/report.json").status, 200);
-    // What the system still had on its way comes, but not the file.
-    let mut taken = Vec::new();
-    let _ = (&still[0]).read_to_end(&mut taken);
-    assert!((taken.len() as u64) < LARGE, "{}", taken.len());
+    // What the system still had on its way comes, but not the file. Not all have lost their places yet: that one has let the report through.
+    let is_cut_off = |mut stream: &TcpStream| {
+        let mut taken = Vec::new();
+        let _ = stream.read_to_end(&mut taken);
+        (taken.len() as u64) < LARGE
+    };
+    assert!(still.iter().any(is_cut_off));
 }
 
 #[test]

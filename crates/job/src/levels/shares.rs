@@ -7,10 +7,10 @@ use crate::records::{ExactTile, Store};
 use sys::Result;
 use tiles::lod::relief::Relief;
 
-/// Of [`OF`] vertices so many are given to each tile by its size, the others to where vertices stand out furthest. With half of that, flat tiles have so
-/// few that viewers show exact ones in their place from twice as far.
-const EVENLY: u64 = 3;
-const OF: u64 = 10;
+/// Of [`OF`] vertices so many are given to each tile by its size, the others to where vertices stand out furthest. With fewer, flat tiles have so few that
+/// viewers show exact ones in their place from far; with more, the level is further from the exact mesh.
+const EVENLY: u64 = 1;
+const OF: u64 = 5;
 
 /// The most times its own number of vertices that a tile gets.
 const MOST_TIMES: u64 = 3;
