@@ -282,8 +282,8 @@ fn great_tiles_of_many_threads_keep_to_the_limit() {
     let places = [[2_000, 2_000], [14_000, 2_000], [2_000, 14_000], [14_000, 14_000]];
     let cloud = clouds::write(folder.path(), "cloud.csv", &crowded(&places, 180_000));
     let job = |memory: &str, threads: usize| crowded_job(&cloud, memory).threads(threads).tiles_of(20_000);
-    let tight = job("128 MiB", 4).processors(4);
-    stays_within(&tight.report(), 128);
+    let tight = job("192 MiB", 4).processors(4);
+    stays_within(&tight.report(), 192);
     let wide = job("2 GiB", 1);
     wide.report();
     assert!(files(&tight) == files(&wide));
