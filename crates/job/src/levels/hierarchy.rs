@@ -10,8 +10,8 @@ pub(crate) const BYTES_PER_LEVEL_VERTEX: u64 = 550;
 /// Bytes that the process takes, including what its allocator keeps from earlier steps.
 const KEPT: u64 = 104 << 20;
 
-/// Tiles share vertices below a tile so many levels above them. With one, the first level of woods is an eighth further from the exact mesh; with
-/// three, an update of one tile would change 64.
+/// Tiles share their vertices if the same tile is so many levels above them. With one level, woods are an eighth further from the exact mesh;
+/// with three, an update of one tile would change 64.
 const SHARED_BELOW: usize = 2;
 
 /// A child of a coarser tile.
