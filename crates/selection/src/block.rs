@@ -1,10 +1,11 @@
 //! The triangulation of what is selected, as far as it concerns the points of one block.
 
+use crate::disc::Disc;
 use crate::error_bound::{Candidate, ErrorBound, VerticalError};
 use crate::mesh_of_points::{Held, MeshOfPoints, NONE, TriangleKey};
 use crate::near_points::{NearestTriangles, PointsByPlace};
 use crate::sample::Sample;
-use crate::selected_sites::{Disc, SelectedSites};
+use crate::selected_sites::{SelectedSites, is_in};
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
@@ -18,6 +19,9 @@ const SELECTED: u32 = u32::MAX - 1;
 
 /// If more than one selected point for so many is new, all are triangulated anew.
 const SITES_PER_INSERTED: usize = 5;
+
+/// So many sites cost next to nothing.
+const FEW_SITES: usize = 1000;
 
 /// The points of a block, and a triangulation in which every triangle that holds one of them is a triangle of all that is selected, in this
 /// block or elsewhere.
@@ -45,16 +49,16 @@ pub(crate) struct Block {
     near: NearestTriangles,
 }
 
-fn is_in(bounds: &Bounds<2>, point: &[i32; 3]) -> bool {
-    (0..2).all(|k| bounds.min[k] <= point[k] && point[k] <= bounds.max[k])
-}
-
-/// Returns the box that a block takes selected points from in any case: at most a cell of `selected` around that of the block.
-fn surroundings(bounds: Bounds<2>, selected: &SelectedSites) -> Bounds<2> {
+/// Returns the box that a block of `points` points takes selected points from in any case: at most a cell of `selected` around that of the
+/// block, and no more than has as many selected points as the block has points. Beside a crowd, the box of a block would hold all of it.
+/// [`Block::complete`] finds what concerns the block and is not in the box.
+fn surroundings(bounds: Bounds<2>, points: usize, selected: &SelectedSites) -> Bounds<2> {
     let by = |value: i32, side: i64| (i64::from(value) + side).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
-    // Where points are crowded, a cell may be much larger than a block: `complete` finds what such a box leaves out.
+    let widened = |side: i64| Bounds { min: bounds.min.map(|v| by(v, -side)), max: bounds.max.map(|v| by(v, side)) };
     let side = selected.side().min(bounds.extent(0).max(bounds.extent(1)) / 8).max(1);
-    Bounds { min: bounds.min.map(|value| by(value, -side)), max: bounds.max.map(|value| by(value, side)) }
+    let most = selected.near(bounds) + points + FEW_SITES;
+    let mut sides = std::iter::successors(Some(side), |side| Some(side / 4)).take_while(|side| *side > 0);
+    widened(sides.find(|&side| selected.near(widened(side)) <= most).unwrap_or(0))
 }
 
 /// What a block proposes to select: the worst points of triangles where they exceed the bound by far, or exceed it and are further from their
@@ -132,9 +136,9 @@ impl Block {
         afar: &[[i32; 3]],
         triangulate: impl FnOnce(&[Site]) -> Result<HalfEdgeMesh, E>,
     ) -> Result<Block, E> {
-        let around = surroundings(bounds, selected);
-        let mut known = afar.to_vec();
-        selected.within(around).for_each(|point| known.push(point));
+        let around = surroundings(bounds, points.len(), selected);
+        let mut known = selected.within(around);
+        known.extend(afar);
         let key = |value: i32| u64::from(value.cast_unsigned() ^ 1 << 31);
         radsort::sort_by_key(&mut known, |&[x, y, _]| key(y) << 32 | key(x));
         known.dedup();
@@ -187,14 +191,14 @@ impl Block {
     /// Inserts what has been added last to what is `selected`, as far as it concerns the block.
     pub(crate) fn update(&mut self, selected: &SelectedSites) {
         let mut concerns_border = false;
-        selected.newly_within(self.reach).for_each(|point| {
+        for point in selected.newly_within(self.reach) {
             if is_in(&self.around, &point) {
                 let start = self.near.of(point);
                 self.insert(point, start);
             } else {
                 concerns_border = true;
             }
-        });
+        }
         self.place_displaced();
         self.complete(selected, concerns_border);
     }

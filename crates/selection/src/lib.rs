@@ -11,6 +11,7 @@
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 mod block;
+mod disc;
 mod error_bound;
 mod hull;
 mod mesh_of_points;

@@ -170,7 +170,7 @@ impl<'a, E: Send> Rounds<'a, E> {
     /// Returns what a block proposes to select. A block that has nothing to propose is left alone until points are selected near it.
     fn proposal_of(&self, index: usize, bound: ErrorBound) -> Result<Proposal, E> {
         let mut state = self.blocks[index].lock().unwrap_or_else(PoisonError::into_inner);
-        if state.settled.is_some_and(|reach| self.selected.newly_within(reach).next().is_none()) {
+        if state.settled.is_some_and(|reach| !self.selected.has_newly_within(reach)) {
             return Ok(Proposal::default());
         }
         self.with_block(index, &mut state, |block| (block.propose(bound), block.settled_within())).map(
@@ -195,7 +195,9 @@ impl<'a, E: Send> Rounds<'a, E> {
         };
         let mut block = match state.block.take() {
             Some(block) if block.grows_by_far(&self.selected) => {
-                let (points, afar) = block.into_points();
+                let (points, mut afar) = block.into_points();
+                // Those of them that were around the block need not be any more.
+                afar.extend(&self.outline);
                 triangulated(points, &afar)?
             }
             Some(mut block) => {

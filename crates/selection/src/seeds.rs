@@ -39,6 +39,12 @@ impl LatticeCells {
         1 << self.shift
     }
 
+    /// Returns cells of a sixteenth of the side, or of one step, and how many times as many there are along each axis; `None` if the side is one step.
+    pub(crate) fn finer(self) -> Option<(LatticeCells, i32)> {
+        let shift = self.shift.saturating_sub(4);
+        (shift < self.shift).then(|| (LatticeCells { shift, ..self }, 1 << (self.shift - shift)))
+    }
+
     /// Returns by what points of a cell are compared: the square of the distance from its middle, and the point.
     fn rank(self, point: [i32; 3]) -> (i64, [i32; 3]) {
         let along = |axis: usize| i64::from(point[axis] + self.offset[axis]).rem_euclid(self.side()) - self.side() / 2;

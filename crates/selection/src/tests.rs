@@ -71,8 +71,8 @@ fn selected(
 ) -> (Vec<[i32; 3]>, Figures) {
     let bounds = bounds_of(points);
     let Selection { sites, figures, holding } = select(&Cloud::new(points, fixed, side, keeps), bound).unwrap();
-    holds_the_others(&sites.within(bounds).collect::<BTreeSet<_>>(), points, &holding);
-    let mut all: Vec<_> = sites.within(bounds).collect();
+    holds_the_others(&sites.within(bounds).into_iter().collect::<BTreeSet<_>>(), points, &holding);
+    let mut all: Vec<_> = sites.within(bounds);
     all.sort_unstable();
     (all, figures)
 }
@@ -277,6 +277,40 @@ fn rounds_select_about_as_many_points_as_greedy_insertion() {
     }
 }
 
+#[test]
+fn a_block_beside_a_crowd_takes_little_of_it() {
+    let crowd: Vec<[i32; 3]> = (0..40_000).map(|i| [50_500 + i % 200, 50_000 + i / 200, i % 31]).collect();
+    let sparse: Vec<[i32; 3]> = (0..400).map(|i| [i % 20 * 2_500, i / 20 * 5_000, i % 7]).collect();
+    let corners = [[0, 0, 0], [100_000, 0, 0], [0, 100_000, 0], [100_000, 100_000, 0]];
+    let all: Vec<[i32; 3]> = crowd.iter().chain(&sparse).chain(&corners[1..]).copied().collect();
+    let mut known = SelectedSites::none(bounds_of(&all), all.len() as u64);
+    known.add(all);
+    let bounds = bounds_of(&sparse);
+    let points = crate::near_points::PointsByPlace::of(&sparse, bounds);
+    let mut triangulated = 0;
+    let triangulate = |sites: &[Site]| {
+        triangulated = sites.len();
+        canonical(sites)
+    };
+    crate::block::Block::new(points, bounds, Sample::all([0; 2]), &known, &corners, triangulate).unwrap();
+    assert!((400..2_500).contains(&triangulated), "{triangulated}");
+}
+
+/// Blocks beside a crowd take less and less of it, and still know the corners of the hull.
+#[test]
+fn a_crowd_does_not_depend_on_blocks() {
+    let rough = |i: i32| i * 7_919 % 101;
+    let spread = (0..1_000).map(|i| [i * 7_919 % 10_007 * 1_000, i * 104_729 % 10_009 * 1_000, rough(i)]);
+    let strip = (0..20_000).map(|i| [i * 499 + i % 7, 4_999_000 + i * 31 % 1_999, rough(i)]);
+    let points: Vec<[i32; 3]> = spread.chain(strip).collect();
+    let bound = ErrorBound::new(12, 1);
+    let one = selected(&points, &[], 100_000_000, bound, true);
+    assert!((5_000..21_000).contains(&one.0.len()), "{}", one.0.len());
+    for side in [625_000, 1_250_000, 5_000_000] {
+        assert!(selected(&points, &[], side, bound, true) == one, "blocks of {side}");
+    }
+}
+
 /// With small regions: every point is within the bound, and nothing depends on the blocks, or on where the lattice begins.
 #[test]
 fn regions_depend_on_the_points_alone() {
@@ -295,7 +329,7 @@ fn regions_depend_on_the_points_alone() {
             cloud.offset = offset.map(i64::from);
             let bounds = bounds_of(&points);
             let found = crate::select::select_by_regions(&cloud, bound, sizes).unwrap();
-            let mut all: Vec<_> = found.sites.within(bounds).map(back).collect();
+            let mut all: Vec<_> = found.sites.within(bounds).into_iter().map(back).collect();
             all.sort_unstable();
             let worst = found.figures.worst.map(back);
             (all, Figures { worst, ..found.figures })

@@ -302,13 +302,13 @@ impl PointSource for PointsInBlocks<'_> {
 }
 
 /// Removes all but the selected sites. Sites are in the order of [`load_sites`]: by y, then x.
-fn leave_selected(sites: &mut Vec<Point>, selected: impl Iterator<Item = [i32; 3]>) {
+fn leave_selected(sites: &mut Vec<Point>, selected: Vec<[i32; 3]>) {
     // As an unsigned number, a coordinate with the sign bit turned is in the same order.
     let key = |[x, y]: Site| {
         let [y, x] = [y, x].map(|along| u64::from(along.cast_unsigned() ^ 1 << 31));
         y << 32 | x
     };
-    let mut selected: Vec<u64> = selected.map(|[x, y, _]| key([x, y])).collect();
+    let mut selected: Vec<u64> = selected.into_iter().map(|[x, y, _]| key([x, y])).collect();
     radsort::sort(&mut selected);
     let mut next = selected.into_iter().peekable();
     sites.retain(|site| {

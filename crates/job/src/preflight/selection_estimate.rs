@@ -39,7 +39,7 @@ fn selected_of(points: &[[i32; 3]], bound: ErrorBound) -> Result<u64> {
 pub(crate) fn selected_points(points: &[[i32; 3]], bound: ErrorBound) -> Result<Vec<[i32; 3]>> {
     let Some(bounds) = Bounds::of_points(points.iter().map(|[x, y, _]| [*x, *y])) else { return Ok(Vec::new()) };
     let Selection { sites, .. } = select(&Sample(points), bound)?;
-    let mut selected: Vec<[i32; 3]> = sites.within(bounds).collect();
+    let mut selected = sites.within(bounds);
     selected.sort_unstable();
     Ok(selected)
 }
