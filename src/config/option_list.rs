@@ -4,6 +4,7 @@
 use crate::config::least::{is_taken, refusal};
 use crate::config::nearest::nearest;
 use std::collections::HashSet;
+use std::sync::LazyLock;
 use toml::Value;
 
 /// Every option with its default, and with what it does in comments.
@@ -12,8 +13,11 @@ const FULL: &str = include_str!("../../configs/full.toml");
 /// A word that no option knows.
 const NO_WORD: &str = "no such word";
 
+/// All options. The command line asks for several at every start.
+static OPTIONS: LazyLock<Vec<ConfigOption>> = LazyLock::new(listed);
+
 /// A key of a configuration.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct ConfigOption {
     /// Its table as a configuration has it, such as `[input.csv]` or `[[breaklines]]`.
     pub(crate) table: &'static str,
@@ -27,8 +31,8 @@ pub(crate) struct ConfigOption {
 impl ConfigOption {
     /// Returns the option of this name, if there is one. It may be a table within another one.
     pub(crate) fn find(table: &str, key: &str) -> Option<ConfigOption> {
-        let named = options().into_iter().find(|option| option.table == table && option.key == key);
-        named.or_else(|| ConfigOption::of_inner_table(table, key))
+        let named = OPTIONS.iter().find(|option| option.table == table && option.key == key);
+        named.cloned().or_else(|| ConfigOption::of_inner_table(table, key))
     }
 
     /// Returns the table of this name in another one as an option of that.
@@ -77,6 +81,11 @@ impl ConfigOption {
 
 /// Returns all options.
 pub(crate) fn options() -> Vec<ConfigOption> {
+    OPTIONS.clone()
+}
+
+/// Reads all options from the list.
+fn listed() -> Vec<ConfigOption> {
     let (mut table, mut words, mut found) = ("", Vec::new(), Vec::new());
     for line in FULL.lines() {
         let text = line.strip_prefix("# ").unwrap_or(line);

@@ -235,9 +235,12 @@ fn hills_for_globes(folder: &Path, scheme: &str) -> Job {
         .with("output", &terrain)
 }
 
-/// Returns directions to look at a terrain from, near it and so far that the surroundings are seen too.
-fn views() -> Vec<[f64; 3]> {
-    (0..8).flat_map(|turn| [[f64::from(45 * turn), -35.0, 600.0], [f64::from(45 * turn), -60.0, 9_000.0]]).collect()
+/// Returns twenty directions to look at a terrain from, near it and so far that the surroundings are seen too: heading and pitch in degrees, and
+/// the distance in metres.
+fn views(seed: u64) -> Vec<[f64; 3]> {
+    let mut random = Random(seed);
+    let mut between = |low: f64, high: f64| low + (high - low) * random.below(1_000) as f64 / 1_000.0;
+    (0..20).map(|_| [between(0.0, 360.0), between(-85.0, -35.0), 300.0 * 30f64.powf(between(0.0, 1.0))]).collect()
 }
 
 /// Opens the terrain tiles of a job in a page, asserts that all pixels of all views are covered, and returns what the page answers.
@@ -251,19 +254,19 @@ fn covered(job: &Job, chromium: &Path, page: &str, places: &[[f64; 3]], views: &
     seen
 }
 
-/// CesiumJS drapes imagery over terrain tiles of both schemes, finds the heights of the mesh in them, and shows no hole from any side, nor on the other side
-/// of the globe. 3d-tiles-renderer shows none either.
+/// CesiumJS drapes imagery over terrain tiles of both schemes, finds the heights of the mesh in them, and shows no hole in forty views, nor on the other
+/// side of the globe. 3d-tiles-renderer shows none either.
 #[test]
 fn viewers_take_their_ground_from_terrain_tiles() {
     let Some(chromium) = chromium() else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut found: Vec<Vec<f64>> = Vec::new();
     let mut step = 0.0;
-    for (scheme, projection) in [("geographic", "EPSG:4326"), ("web-mercator", "EPSG:3857")] {
+    for (seed, scheme, projection) in [(3, "geographic", "EPSG:4326"), (4, "web-mercator", "EPSG:3857")] {
         let job = hills_for_globes(folder.path(), scheme);
         let report = job.report();
         let places = middles(&job, &tiles(&job));
-        let seen = covered(&job, &chromium, "terrain", &places, &views());
+        let seen = covered(&job, &chromium, "terrain", &places, &views(seed));
         assert_eq!((&seen["hasNormals"], &seen["hasWaterMask"]), (&json!(true), &json!(false)));
         assert_eq!(seen["isWebMercator"], json!(projection == "EPSG:3857"));
         let off: Vec<f64> = serde_json::from_value(seen["off"].clone()).unwrap();
@@ -302,7 +305,7 @@ fn cesium_gets_the_water_mask_of_lakes() {
         let offset = [0, 1, 2].map(|axis| georeference["offset"][axis].as_f64().unwrap());
         let local = |[x, y, z]: [f64; 3]| [500_000.0 + x - offset[0], 4_000_000.0 + y - offset[1], z - offset[2]];
         let places = [[100.0, 85.0, 10.0], [130.0, 110.0, 10.0], [112.0, 105.0, 10.0], [60.0, 60.0, 15.0]].map(local);
-        let seen = covered(&job, &chromium, "terrain", &places, &views());
+        let seen = covered(&job, &chromium, "terrain", &places, &[[0.0, -60.0, 600.0]]);
         assert_eq!((&seen["hasWaterMask"], &seen["masks"]), (&json!(true), &json!([255, 255, 0, 0])), "{scheme}");
     }
 }

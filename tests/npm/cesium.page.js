@@ -7,7 +7,7 @@ const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 function emptyScene() {
   const widget = new CesiumWidget('scene', {
     baseLayer: false, globe: false, skyBox: false, skyAtmosphere: false, useDefaultRenderLoop: false,
-    creditContainer: document.createElement('div'), contextOptions: { webgl: { preserveDrawingBuffer: true } },
+    msaaSamples: 1, orderIndependentTranslucency: false, creditContainer: document.createElement('div'), contextOptions: { webgl: { preserveDrawingBuffer: true } },
   });
   widget.resize();
   const { scene } = widget;
@@ -83,7 +83,7 @@ async function show({ places, pixels }) {
   const seen = {};
   for (const [name, error] of [['coarse', await coarseError(scene, tileset)], ['fine', 1e-6]]) {
     tileset.maximumScreenSpaceError = error;
-    for (let calm = 0; calm < 10;) {
+    for (let calm = 0; calm < 5;) {
       shown.clear();
       scene.render();
       await pause(20);

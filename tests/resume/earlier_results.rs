@@ -18,19 +18,19 @@ pub(crate) struct Earlier {
 }
 
 pub(crate) fn base() -> Setup {
-    Setup::tiles_of(1_500).output("max_edge = 9000").output("max_points_per_level_tile = 1000")
+    Setup::tiles_of(500).output("max_edge = 15000").output("max_points_per_level_tile = 350")
 }
 
 impl Earlier {
     pub(crate) fn new() -> Earlier {
-        let mut rig = Rig::new(&scattered::gaussian(9_000), &base());
+        let mut rig = Rig::new(&scattered::gaussian(3_000), &base());
         rig.completes("the earlier job");
         let results = files(&rig.out());
         for folder in ["cut/", "levels/", "tiles/"] {
             assert!(results.keys().any(|name| name.starts_with(folder)), "{folder}");
         }
         let report = fs::read(rig.out().join("report.json")).unwrap();
-        scattered::write(rig.folder.path(), "cloud.csv", &scattered::clusters(9_000));
+        scattered::write(rig.folder.path(), "cloud.csv", &scattered::clusters(3_000));
         rig.expect(&base());
         Earlier { rig, results, report }
     }

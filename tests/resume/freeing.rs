@@ -24,21 +24,21 @@ fn can_free() -> bool {
 
 #[test]
 fn a_job_that_frees_its_mesh_goes_on_where_it_was_killed() {
-    let rig = small_job(&Setup::tiles_of(2_000).freeing());
+    let rig = small_job(&Setup::tiles_of(800).freeing());
     let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 2)).sum();
     assert!(kills >= 20, "only {kills} kills");
 }
 
 #[test]
 fn a_job_of_two_threads_that_frees_its_mesh_is_killed_at_random_moments() {
-    let setup = Setup::tiles_of(2_000).threads(2).freeing().output("max_edge = 4000");
-    let rig = Rig::new(&scattered::gaussian(40_000), &setup);
+    let setup = Setup::tiles_of(800).threads(2).freeing().output("max_edge = 6000");
+    let rig = Rig::new(&scattered::gaussian(16_000), &setup);
     kill_at_random(&rig, 4, kills_wanted(20));
 }
 
 #[test]
 fn with_auto_no_leaf_is_freed_that_the_next_run_counts() {
-    let rig = small_job(&Setup::tiles_of(2_000).output("max_edge = \"auto\"").freeing());
+    let rig = small_job(&Setup::tiles_of(800).output("max_edge = \"auto\"").freeing());
     let kills = kill_at_each(&rig, "committed", 1);
     assert!(kills >= 6, "only {kills} kills");
 }

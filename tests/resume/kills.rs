@@ -11,7 +11,7 @@ use crate::scattered;
 pub(crate) const PLACES: [&str; 6] = ["commit", "published", "torn", "committed", "leaf", "tile"];
 
 pub(crate) fn small_job(setup: &Setup) -> Rig {
-    Rig::new(&scattered::clusters(20_000), setup)
+    Rig::new(&scattered::clusters(8_000), setup)
 }
 
 /// For every `stride`-th time that a run comes to `place`: starts over, kills the run there and runs the job again. Returns the
@@ -45,21 +45,21 @@ pub(crate) fn kill_at_each(rig: &Rig, place: &str, stride: usize) -> u64 {
 
 #[test]
 fn a_job_killed_anywhere_goes_on_where_it_stopped() {
-    let rig = small_job(&Setup::tiles_of(3_500));
+    let rig = small_job(&Setup::tiles_of(1_400));
     let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 1)).sum();
     assert!(kills >= 40, "only {kills} kills");
 }
 
 #[test]
 fn a_job_of_two_threads_killed_anywhere_goes_on_where_it_stopped() {
-    let rig = small_job(&Setup::tiles_of(3_500).threads(2));
+    let rig = small_job(&Setup::tiles_of(1_400).threads(2));
     let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 2)).sum();
     assert!(kills >= 20, "only {kills} kills");
 }
 
 #[test]
 fn a_job_with_max_edge_and_levels_goes_on_where_it_was_killed() {
-    let setup = Setup::tiles_of(2_000).output("max_edge = \"auto\"").output("max_points_per_level_tile = 1000");
+    let setup = Setup::tiles_of(800).output("max_edge = \"auto\"").output("max_points_per_level_tile = 400");
     let rig = small_job(&setup);
     for folder in ["cut/", "levels/"] {
         assert!(rig.expected.keys().filter(|name| name.starts_with(folder)).count() > 2, "{folder}");
@@ -70,7 +70,7 @@ fn a_job_with_max_edge_and_levels_goes_on_where_it_was_killed() {
 
 #[test]
 fn a_job_with_max_error_goes_on_where_it_was_killed() {
-    let rig = small_job(&Setup::tiles_of(2_000).output("max_error = 0.05"));
+    let rig = small_job(&Setup::tiles_of(800).output("max_error = 0.05"));
     let kills: u64 = PLACES.iter().chain(&["select"]).map(|place| kill_at_each(&rig, place, 4)).sum();
     assert!(kills >= 12, "only {kills} kills");
 }
@@ -78,14 +78,17 @@ fn a_job_with_max_error_goes_on_where_it_was_killed() {
 #[test]
 fn a_job_that_finds_the_ground_goes_on_where_it_was_killed() {
     let input = "files = [\"cloud.csv\"]\nsurface = \"bare-earth\"".into();
-    let rig = small_job(&Setup { input, ..Setup::tiles_of(2_000) });
+    // Ground is looked for on a grid of metres, so the cloud is not wide.
+    let mut cloud = scattered::uniform(8_000, 400, 5);
+    cloud.iter_mut().for_each(|[_, _, z]| *z %= 5);
+    let rig = Rig::new(&cloud, &Setup { input, ..Setup::tiles_of(800) });
     let kills: u64 = PLACES.iter().chain(&["ground"]).map(|place| kill_at_each(&rig, place, 4)).sum();
     assert!(kills >= 12, "only {kills} kills");
 }
 
 #[test]
 fn a_job_killed_again_and_again_still_ends() {
-    let rig = small_job(&Setup::tiles_of(3_500).threads(2));
+    let rig = small_job(&Setup::tiles_of(1_400).threads(2));
     // Every run records a phase more than the one before.
     for (place, count) in [("committed", 1), ("torn", 2)] {
         rig.forget();
@@ -102,7 +105,7 @@ fn a_job_killed_again_and_again_still_ends() {
 
 #[test]
 fn a_job_killed_while_it_cleans_up_is_not_done_again() {
-    let rig = small_job(&Setup::tiles_of(5_000));
+    let rig = small_job(&Setup::tiles_of(2_000));
     // It removes the store, the plan, the journals, and folders.
     let least = rig.stores().len() as u64 + 3;
     for count in 1.. {
@@ -154,19 +157,19 @@ pub(crate) fn kill_at_random(rig: &Rig, seed: u64, kills: u64) {
 
 #[test]
 fn a_job_of_one_thread_killed_at_random_moments_ends_with_the_same_bytes() {
-    let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(2_000));
+    let rig = Rig::new(&scattered::gaussian(16_000), &Setup::tiles_of(800));
     kill_at_random(&rig, 1, kills_wanted(45));
 }
 
 #[test]
 fn a_job_of_two_threads_killed_at_random_moments_ends_with_the_same_bytes() {
-    let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(2_000).threads(2));
+    let rig = Rig::new(&scattered::gaussian(16_000), &Setup::tiles_of(800).threads(2));
     kill_at_random(&rig, 2, kills_wanted(45));
 }
 
 /// Returns a job of several parts, on files of neighbouring points.
 fn job_of_parts(setup: Setup) -> Rig {
-    let cloud = scattered::gaussian(24_000);
+    let cloud = scattered::gaussian(9_600);
     let folder = tempfile::tempdir().unwrap();
     let rig = Rig::of_files(folder, &cloud, 60_000, &setup);
     assert!(rig.expected.len() > 60);
@@ -174,13 +177,13 @@ fn job_of_parts(setup: Setup) -> Rig {
 }
 
 fn parts_of(points: u64, threads: usize) -> Setup {
-    let setup = Setup::tiles_of(700).threads(threads);
+    let setup = Setup::tiles_of(280).threads(threads);
     Setup { triangulation: format!("{}\nmax_points_per_part = {points}", setup.triangulation), ..setup }
 }
 
 #[test]
 fn a_job_of_parts_killed_anywhere_goes_on_where_it_stopped() {
-    for setup in [parts_of(4_000, 1), parts_of(4_000, 1).freeing()] {
+    for setup in [parts_of(1_600, 1), parts_of(1_600, 1).freeing()] {
         let rig = job_of_parts(setup);
         let kills: u64 = PLACES.iter().map(|place| kill_at_each(&rig, place, 9)).sum();
         assert!(kills >= 20, "only {kills} kills");
@@ -190,7 +193,7 @@ fn a_job_of_parts_killed_anywhere_goes_on_where_it_stopped() {
 #[test]
 fn a_job_of_parts_killed_at_random_moments_ends_with_the_same_bytes() {
     for (seed, threads) in [(5, 1), (6, 2)] {
-        let rig = job_of_parts(parts_of(3_000, threads));
+        let rig = job_of_parts(parts_of(1_200, threads));
         kill_at_random(&rig, seed, kills_wanted(45));
     }
 }
@@ -198,7 +201,7 @@ fn a_job_of_parts_killed_at_random_moments_ends_with_the_same_bytes() {
 /// What was freed cannot be done again. So if a result is gone by then, the job starts over.
 #[test]
 fn a_job_of_parts_whose_results_are_lost_while_it_is_interrupted_starts_over() {
-    let rig = job_of_parts(parts_of(4_000, 1));
+    let rig = job_of_parts(parts_of(1_600, 1));
     for lost in [1, 40] {
         assert!(rig.run_to("replacing", 1).was_killed());
         let results = rig.out().join("job/results");
@@ -212,14 +215,14 @@ fn a_job_of_parts_whose_results_are_lost_while_it_is_interrupted_starts_over() {
 
 #[test]
 fn a_job_on_a_gpu_goes_on_where_it_was_killed() {
-    let setup = Setup::tiles_of(3_500).threads(2).backend("gpu");
+    let setup = Setup::tiles_of(1_400).threads(2).backend("gpu");
     let there = std::process::Command::new(env!("CARGO_BIN_EXE_gdt-batch")).args(["gpu", "--leaves", "0"]).output();
     if !there.is_ok_and(|output| output.status.success()) {
         assert!(std::env::var_os("GDT_TEST_ALL").is_none(), "no GPU, not even a software renderer");
         eprintln!("skipped: there is no GPU here; the software renderer of Debian's mesa-vulkan-drivers is enough");
         return;
     }
-    let rig = Rig::new(&scattered::uniform(20_000, 100_000, 5), &setup);
+    let rig = Rig::new(&scattered::uniform(8_000, 100_000, 5), &setup);
     let counts = &rig.completes("without a kill")["leaves"]["outcome"]["counts"];
     assert!(counts["on_gpu"].as_u64().unwrap() >= 6, "{counts}");
     let kills = ["leaf", "torn"].iter().map(|place| kill_at_each(&rig, place, 2)).sum::<u64>();

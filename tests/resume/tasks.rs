@@ -12,9 +12,9 @@ const PHASES: [&str; 7] = ["plan", "read", "mesh", "join", "tiles", "levels", "p
 
 /// Returns a job of several parts, on files of neighbouring points.
 pub(crate) fn job_of_parts() -> Rig {
-    let setup = Setup::tiles_of(700);
-    let setup = Setup { triangulation: format!("{}\nmax_points_per_part = 4000", setup.triangulation), ..setup };
-    let rig = Rig::of_files(tempfile::tempdir().unwrap(), &scattered::gaussian(24_000), 60_000, &setup);
+    let setup = Setup::tiles_of(280);
+    let setup = Setup { triangulation: format!("{}\nmax_points_per_part = 1600", setup.triangulation), ..setup };
+    let rig = Rig::of_files(tempfile::tempdir().unwrap(), &scattered::gaussian(9_600), 60_000, &setup);
     assert!(rig.expected.len() > 60);
     rig
 }

@@ -26,8 +26,10 @@ const FEW_SITES: usize = 1000;
 /// The points of a block, and a triangulation in which every triangle that holds one of them is a triangle of all that is selected, in this
 /// block or elsewhere.
 pub(crate) struct Block {
-    /// The points, neighbours in the plane one after the other.
+    /// The points that are looked at, neighbours in the plane one after the other.
     points: Vec<[i32; 3]>,
+    /// Those that are not, likewise.
+    later: Vec<[i32; 3]>,
     /// For each point the next that lies in the same triangle, or [`SELECTED`].
     next: Vec<u32>,
     /// Which of them are looked at.
@@ -129,14 +131,15 @@ impl Block {
     /// Returns the block of `points`, which lie in `bounds`, and what `selected` has near them. `afar` are others that are selected, among them the
     /// corners of the hull of the whole cloud that are not near. `triangulate` returns the canonical triangulation of sites.
     pub(crate) fn new<E>(
-        PointsByPlace(points): PointsByPlace,
+        PointsByPlace { looked_at: points, later }: PointsByPlace,
         bounds: Bounds<2>,
         sample: Sample,
         selected: &SelectedSites,
         afar: &[[i32; 3]],
         triangulate: impl FnOnce(&[Site]) -> Result<HalfEdgeMesh, E>,
     ) -> Result<Block, E> {
-        let around = surroundings(bounds, points.len(), selected);
+        let all = points.len() + later.len();
+        let around = surroundings(bounds, all, selected);
         let mut known = selected.within(around);
         known.extend(afar);
         let key = |value: i32| u64::from(value.cast_unsigned() ^ 1 << 31);
@@ -145,12 +148,12 @@ impl Block {
         let sites: Vec<Site> = known.iter().map(|&[x, y, _]| [x, y]).collect();
         let mesh = triangulate(&sites)?;
         let mesh = MeshOfPoints::new(&known, sites, mesh);
-        let of_sample = (0..points.len() as u32).filter(|&point| sample.has(points[point as usize]));
-        let displaced = of_sample.map(|point| (point, NONE)).collect();
-        let near = NearestTriangles::new(bounds, points.len());
+        let displaced = (0..points.len() as u32).map(|point| (point, NONE)).collect();
+        let near = NearestTriangles::new(bounds, all);
         let next = vec![NONE; points.len()];
         let mut block = Block {
             points,
+            later,
             next,
             sample,
             bounds,
@@ -184,8 +187,8 @@ impl Block {
         let afar = sites.filter(|site| !is_in(&self.around, site)).collect();
         recycle(self.mesh.mesh);
         let points = self.points.into_iter().zip(self.next);
-        let points = points.filter(|(_, next)| *next != SELECTED).map(|(point, _)| point).collect();
-        (PointsByPlace(points), afar)
+        let looked_at = points.filter(|(_, next)| *next != SELECTED).map(|(point, _)| point).collect();
+        (PointsByPlace { looked_at, later: self.later }, afar)
     }
 
     /// Inserts what has been added last to what is `selected`, as far as it concerns the block.
@@ -208,11 +211,10 @@ impl Block {
         if sample == self.sample {
             return;
         }
-        let is_new = |point: &u32| {
-            let place = self.points[*point as usize];
-            sample.has(place) && !self.sample.has(place)
-        };
-        self.displaced = (0..self.points.len() as u32).filter(is_new).map(|point| (point, NONE)).collect();
+        let known = self.points.len() as u32;
+        self.points.extend(self.later.extract_if(.., |point| sample.has(*point)));
+        self.next.resize(self.points.len(), NONE);
+        self.displaced = (known..self.points.len() as u32).map(|point| (point, NONE)).collect();
         self.sample = sample;
         self.mesh.changed = (0..self.mesh.held.len() as u32).collect();
         self.place_displaced();

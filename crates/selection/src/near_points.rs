@@ -1,5 +1,6 @@
 //! Small squares over the points of a block: which points and which triangles are near each other.
 
+use crate::sample::Sample;
 use delaunay::geometry::Bounds;
 use delaunay::geometry::square_grid::SquareGrid;
 
@@ -34,10 +35,15 @@ fn grid_of(bounds: Bounds<2>, points: usize, wanted: f64) -> SquareGrid {
 }
 
 /// The points of a block row by row of small cells, to and fro.
-pub(crate) struct PointsByPlace(pub(crate) Vec<[i32; 3]>);
+pub(crate) struct PointsByPlace {
+    /// Those of a sample.
+    pub(crate) looked_at: Vec<[i32; 3]>,
+    /// The others.
+    pub(crate) later: Vec<[i32; 3]>,
+}
 
 impl PointsByPlace {
-    pub(crate) fn of(points: &[[i32; 3]], bounds: Bounds<2>) -> PointsByPlace {
+    pub(crate) fn of(points: &[[i32; 3]], bounds: Bounds<2>, sample: Sample) -> PointsByPlace {
         let grid = grid_of(bounds, points.len(), 4.0);
         let columns = grid.columns();
         let key = |(i, cell): (usize, u32)| {
@@ -47,6 +53,8 @@ impl PointsByPlace {
         };
         let mut keys: Vec<u64> = grid.cells_of(points).into_iter().enumerate().map(key).collect();
         radsort::sort_by_key(&mut keys, |key| (key >> 32) as u32);
-        PointsByPlace(keys.into_iter().map(|key| points[key as u32 as usize]).collect())
+        let by_place = keys.into_iter().map(|key| points[key as u32 as usize]);
+        let (looked_at, later) = by_place.partition(|point| sample.has(*point));
+        PointsByPlace { looked_at, later }
     }
 }

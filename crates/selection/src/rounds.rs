@@ -207,7 +207,7 @@ impl<'a, E: Send> Rounds<'a, E> {
             }
             None => {
                 let points = state.take_points(self.source, index)?;
-                triangulated(PointsByPlace::of(&points, bounds), &self.outline)?
+                triangulated(PointsByPlace::of(&points, bounds, self.sample), &self.outline)?
             }
         };
         let done = work(&mut block);

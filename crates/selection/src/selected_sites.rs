@@ -10,8 +10,8 @@ use std::ops::{ControlFlow, Range};
 const POINTS_PER_CELL: u64 = 256;
 /// There are no more columns and rows.
 const MOST_LINES: i64 = 1 << 13;
-/// A cell with more selected points is divided: where points are crowded, whatever is near would look at all of them.
-const MOST_PER_CELL: usize = 4 * POINTS_PER_CELL as usize;
+/// A cell with more selected points is divided: whatever is near looks at all of them.
+const MOST_PER_CELL: usize = POINTS_PER_CELL as usize / 2;
 
 /// All selected points of a cloud.
 #[derive(Debug)]

@@ -267,8 +267,8 @@ fn rounds_select_about_as_many_points_as_greedy_insertion() {
         let bound = ErrorBound::new(steps, 1);
         let mut known = SelectedSites::none(bounds, points.len() as u64);
         known.add(hull.iter().copied());
-        let all = crate::near_points::PointsByPlace::of(&points, bounds);
         let whole = Sample::all([0; 2]);
+        let all = crate::near_points::PointsByPlace::of(&points, bounds, whole);
         let block = crate::block::Block::new(all, bounds, whole, &known, &hull, canonical).unwrap();
         let greedy = crate::block::greedy_insertion(block, &mut known, bound);
         let (found, figures) = selected(&points, &[], 4_000, bound, true);
@@ -286,13 +286,14 @@ fn a_block_beside_a_crowd_takes_little_of_it() {
     let mut known = SelectedSites::none(bounds_of(&all), all.len() as u64);
     known.add(all);
     let bounds = bounds_of(&sparse);
-    let points = crate::near_points::PointsByPlace::of(&sparse, bounds);
+    let whole = Sample::all([0; 2]);
+    let points = crate::near_points::PointsByPlace::of(&sparse, bounds, whole);
     let mut triangulated = 0;
     let triangulate = |sites: &[Site]| {
         triangulated = sites.len();
         canonical(sites)
     };
-    crate::block::Block::new(points, bounds, Sample::all([0; 2]), &known, &corners, triangulate).unwrap();
+    crate::block::Block::new(points, bounds, whole, &known, &corners, triangulate).unwrap();
     assert!((400..2_500).contains(&triangulated), "{triangulated}");
 }
 
