@@ -27,7 +27,8 @@ pub(crate) fn is_usual_number(value: f64) -> bool {
 }
 
 fn is_great_power_of_ten(value: f64) -> bool {
-    let mut powers = std::iter::successors(Some(1e9), |power| Some(power * 10.0)).take_while(|power| power.is_finite());
+    let mut powers =
+        std::iter::successors(Some(1e9_f64), |power| Some(power * 10.0)).take_while(|power| power.is_finite());
     powers.any(|power| (value / power - 1.0).abs() < 1e-9)
 }
 
