@@ -82,8 +82,8 @@ fn a_job_that_is_refused_leaves_the_results_of_the_one_before() {
     let earlier = Earlier::new();
     let folder = earlier.rig.folder.path();
     // The configuration is wrong: at once, when the points are known, and when the whole mesh is.
-    earlier.refuses(&with_output("max_edge = 9000", "max_edge = -9"), 2, &["max_edge"]);
-    let refused = earlier.refuses(&with_output("max_edge = 9000", "max_edge = 0.001"), 2, &["all", "greater"]);
+    earlier.refuses(&with_output("max_edge = 15000", "max_edge = -9"), 2, &["max_edge"]);
+    let refused = earlier.refuses(&with_output("max_edge = 15000", "max_edge = 0.001"), 2, &["all", "greater"]);
     assert!(refused.err.contains("correct the configuration"), "{}", refused.err);
     let missing = Setup { input: "files = [\"no.csv\"]".into(), ..base() };
     earlier.refuses(&missing, 2, &["no.csv"]);
@@ -106,7 +106,7 @@ fn a_job_that_is_refused_leaves_the_results_of_the_one_before() {
 #[test]
 fn a_mistyped_max_edge_costs_only_the_tiles() {
     let earlier = Earlier::new();
-    earlier.refuses(&with_output("max_edge = 9000", "max_edge = 0.001"), 2, &["what is done is kept"]);
+    earlier.refuses(&with_output("max_edge = 15000", "max_edge = 0.001"), 2, &["what is done is kept"]);
     earlier.rig.configure(&base());
     let said = earlier.rig.run().succeeded().err;
     assert!(said.contains("[output] max_edge; the tiles are written again"), "{said}");
@@ -151,7 +151,7 @@ fn a_job_killed_while_its_results_take_their_places_is_complete_after_the_next_r
         match count % 3 {
             0 => _ = rig.completes(&format!("replacing, {count}"))["resumed"],
             1 => {
-                rig.configure(&with_output("max_edge = 9000", "max_edge = 0.001"));
+                rig.configure(&with_output("max_edge = 15000", "max_edge = 0.001"));
                 assert_eq!(rig.run().status.code(), Some(2));
                 found_whole(rig, count);
             }
@@ -174,7 +174,7 @@ fn a_damaged_result_and_a_second_kill_leave_a_job_that_the_next_run_completes() 
     assert!(rig.run_to("replacing", 1).was_killed());
     fs::write(rig.out().join("job/results/preview.png"), "damaged").unwrap();
     assert!(rig.run_to("replacing", 3).was_killed());
-    rig.configure(&with_output("max_edge = 9000", "max_edge = 0.001"));
+    rig.configure(&with_output("max_edge = 15000", "max_edge = 0.001"));
     assert_eq!(rig.run().status.code(), Some(2));
     found_whole(rig, 3);
 }

@@ -44,7 +44,8 @@ fn a_signal_within_one_long_step_is_heeded_before_the_step_ends() {
     // All sites of a line are on the hull, so that the merge has all of them.
     let line = (0..70_000).map(|i| if i == 0 { [40_001, 70_000] } else { [2 * i, 0] });
     let wide = || Rig::new(&scattered::with_heights(line.clone()), &Setup::tiles_of(40_000));
-    let dense = || Rig::new(&scattered::uniform(60_000, 100_000, 1), &Setup::tiles_of(100_000));
+    let one_tile = Setup::tiles_of(100_000);
+    let dense = || Rig::new(&scattered::uniform(60_000, 100_000, 1), &one_tile).with_usual_preview(&one_tile);
     // The merge asks until the end of its triangulation, at every kind of place there, and between its parts; the drawing of one tile
     // asks often.
     for (rig, place, counts) in [

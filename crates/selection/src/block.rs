@@ -51,14 +51,14 @@ pub(crate) struct Block {
     near: NearestTriangles,
 }
 
-/// Returns the box that a block of `points` points takes selected points from in any case: at most a cell of `selected` around that of the
-/// block, and no more than has as many selected points as the block has points. Beside a crowd, the box of a block would hold all of it.
+/// Returns the box that a block takes selected points from in any case: at most a cell of `selected` around that of the block, and hardly more
+/// of them around the block than in it. Beside a crowd, the box of a block would hold all of it.
 /// [`Block::complete`] finds what concerns the block and is not in the box.
-fn surroundings(bounds: Bounds<2>, points: usize, selected: &SelectedSites) -> Bounds<2> {
+fn surroundings(bounds: Bounds<2>, selected: &SelectedSites) -> Bounds<2> {
     let by = |value: i32, side: i64| (i64::from(value) + side).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
     let widened = |side: i64| Bounds { min: bounds.min.map(|v| by(v, -side)), max: bounds.max.map(|v| by(v, side)) };
     let side = selected.side().min(bounds.extent(0).max(bounds.extent(1)) / 8).max(1);
-    let most = selected.near(bounds) + points + FEW_SITES;
+    let most = 2 * selected.near(bounds) + FEW_SITES;
     let mut sides = std::iter::successors(Some(side), |side| Some(side / 4)).take_while(|side| *side > 0);
     widened(sides.find(|&side| selected.near(widened(side)) <= most).unwrap_or(0))
 }
@@ -139,7 +139,7 @@ impl Block {
         triangulate: impl FnOnce(&[Site]) -> Result<HalfEdgeMesh, E>,
     ) -> Result<Block, E> {
         let all = points.len() + later.len();
-        let around = surroundings(bounds, all, selected);
+        let around = surroundings(bounds, selected);
         let mut known = selected.within(around);
         known.extend(afar);
         let key = |value: i32| u64::from(value.cast_unsigned() ^ 1 << 31);

@@ -3,6 +3,7 @@
 //! The plane is cut into square cells. A triangle goes to every cell that it may meet, a point to the one that it lies in, and what meets in
 //! a cell is compared. Whether a point lies in a triangle is decided with `robust`, and its distance in integers.
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -19,6 +20,12 @@ use sys::Result;
 /// A cell has so many triangles, more or less.
 const TRIANGLES_PER_CELL: f64 = 32.0;
 
+/// A cell with more pairs of a triangle and a point is divided: where points are crowded, the side that suits the first mesh is far too long.
+const MOST_PAIRS: usize = 1 << 15;
+
+/// Along each side into so many.
+const DIVISIONS: i64 = 8;
+
 /// A triangle or a point in a cell.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
@@ -32,6 +39,14 @@ struct Piece {
 
 const TRIANGLE: i32 = 0;
 const POINT: i32 = 1;
+
+impl Piece {
+    /// Returns a point as a piece of the cell of this side that it lies in.
+    fn of_point(point: [i32; 3], side: i64) -> Piece {
+        let cell = [point[0], point[1]].map(|along| i64::from(along).div_euclid(side) as i32);
+        Piece { cell, kind: POINT, corners: [point; 3] }
+    }
+}
 
 impl KeyedRecord for Piece {
     fn key_hash(&self) -> u64 {
@@ -121,7 +136,9 @@ impl Surface {
             triangles.iter().map(corners).partition::<Vec<_>, _>(|corners| meets_few_cells(corners, side));
         self.large.lock().unwrap_or_else(PoisonError::into_inner).extend(large);
         for corners in small {
-            cells_of(corners, side, |cell| pieces.push(Piece { cell, kind: TRIANGLE, corners }));
+            cells_of(corners, side, [[i64::MIN; 2], [i64::MAX; 2]], |cell| {
+                pieces.push(Piece { cell, kind: TRIANGLE, corners })
+            });
         }
         self.add(&pieces)
     }
@@ -129,9 +146,7 @@ impl Surface {
     /// Adds points that are no vertices.
     pub(super) fn add_points(&self, points: &[[i32; 3]]) -> Result<()> {
         let side = *self.side.get_or_init(|| 1);
-        let cell = |p: &[i32; 3]| [p[0], p[1]].map(|value| i64::from(value).div_euclid(side) as i32);
-        let pieces: Vec<Piece> =
-            points.iter().map(|p| Piece { cell: cell(p), kind: POINT, corners: [*p; 3] }).collect();
+        let pieces: Vec<Piece> = points.iter().map(|point| Piece::of_point(*point, side)).collect();
         self.add(&pieces)
     }
 
@@ -144,12 +159,9 @@ impl Surface {
         let mut proof = SurfaceProof::default();
         let large = &self.large.into_inner().unwrap_or_else(PoisonError::into_inner);
         let pieces = self.pieces.into_inner().unwrap_or_else(PoisonError::into_inner);
-        pieces.for_each_bucket(|bucket| {
-            bucket.par_sort_unstable();
-            let cells: Vec<&[Piece]> = bucket.chunk_by(|a, b| a.cell == b.cell).collect();
-            let of_cells = cells.into_par_iter().map(|cell| check_cell(cell, large, bound, zones));
-            proof = proof.join(of_cells.reduce(SurfaceProof::default, SurfaceProof::join));
-        })?;
+        let side = self.side.into_inner().unwrap_or(1);
+        let comparison = Comparison { large, bound, zones };
+        pieces.for_each_bucket(|bucket| proof = proof.join(comparison.of_cells(bucket, side)))?;
         Ok(proof)
     }
 }
@@ -173,11 +185,11 @@ fn meets_few_cells(corners: &[[i32; 3]; 3], side: i64) -> bool {
     cross(a, b, c) / (2 * side * side) + border <= MANY
 }
 
-/// Calls `visit` for each cell that a triangle may meet: row by row, from its least x there to its greatest.
-fn cells_of(corners: [[i32; 3]; 3], side: i64, mut visit: impl FnMut([i32; 2])) {
+/// Calls `visit` for each cell from the first to the last of these that a triangle may meet: row by row, from its least x there to its greatest.
+fn cells_of(corners: [[i32; 3]; 3], side: i64, [first, last]: [[i64; 2]; 2], mut visit: impl FnMut([i32; 2])) {
     let ys = corners.map(|p| i64::from(p[1]));
     let (low, high) = (ys.into_iter().min().unwrap_or(0), ys.into_iter().max().unwrap_or(0));
-    for row in low.div_euclid(side)..=high.div_euclid(side) {
+    for row in low.div_euclid(side).max(first[1])..=high.div_euclid(side).min(last[1]) {
         let [south, north] = [row * side, (row + 1) * side].map(|y| y as f64);
         let (mut west, mut east) = (f64::INFINITY, f64::NEG_INFINITY);
         for k in 0..3 {
@@ -199,48 +211,87 @@ fn cells_of(corners: [[i32; 3]; 3], side: i64, mut visit: impl FnMut([i32; 2])) 
         }
         if west <= east {
             let column = |x: f64| (x / side as f64).floor() as i64;
-            (column(west)..=column(east)).for_each(|column| visit([column as i32, row as i32]));
+            (column(west).max(first[0])..=column(east).min(last[0]))
+                .for_each(|column| visit([column as i32, row as i32]));
         }
     }
 }
 
-/// Compares the points of a cell with its triangles, which come first, or else with those that are `large`.
-fn check_cell(pieces: &[Piece], large: &[[[i32; 3]; 3]], bound: Bound, zones: Option<&DroppedZones>) -> SurfaceProof {
-    let (triangles, points) = pieces.split_at(pieces.partition_point(|piece| piece.kind == TRIANGLE));
-    let mut proof = SurfaceProof::default();
-    for point in points.iter().map(|piece| piece.corners[0]) {
-        let site = |p: [i32; 3]| [p[0], p[1]];
-        let is_excused = |triangle: Option<[[i32; 3]; 3]>| {
-            zones.is_some_and(|zones| zones.hold(site(point), triangle.map(|corners| corners.map(site))))
-        };
-        let mut all = triangles.iter().map(|piece| &piece.corners).chain(large);
-        let Some(triangle) = all.find(|corners| holds(corners, point)) else {
-            if is_excused(None) {
+/// What points are compared with, beside the triangles of their cell.
+struct Comparison<'a> {
+    /// Triangles that are in no cell.
+    large: &'a [[[i32; 3]; 3]],
+    bound: Bound,
+    zones: Option<&'a DroppedZones<'a>>,
+}
+
+impl Comparison<'_> {
+    /// Compares the points of cells of this side with the triangles of the same cells.
+    fn of_cells(&self, pieces: &mut [Piece], side: i64) -> SurfaceProof {
+        pieces.par_sort_unstable();
+        let cells: Vec<&[Piece]> = pieces.chunk_by(|a, b| a.cell == b.cell).collect();
+        let of_cells = cells.into_par_iter().map(|cell| self.of_cell(cell, side));
+        of_cells.reduce(SurfaceProof::default, SurfaceProof::join)
+    }
+
+    /// Compares the points of a cell with its triangles, which come first, or else with those that are large.
+    fn of_cell(&self, pieces: &[Piece], side: i64) -> SurfaceProof {
+        let (triangles, points) = pieces.split_at(pieces.partition_point(|piece| piece.kind == TRIANGLE));
+        if triangles.len().saturating_mul(points.len()) > MOST_PAIRS && side > 1 {
+            let finer = (side / DIVISIONS).max(1);
+            return self.of_cells(&mut divided(triangles, points, side, finer), finer);
+        }
+        let mut proof = SurfaceProof::default();
+        for point in points.iter().map(|piece| piece.corners[0]) {
+            let site = |p: [i32; 3]| [p[0], p[1]];
+            let is_excused = |triangle: Option<[[i32; 3]; 3]>| {
+                self.zones.is_some_and(|zones| zones.hold(site(point), triangle.map(|corners| corners.map(site))))
+            };
+            let mut all = triangles.iter().map(|piece| &piece.corners).chain(self.large);
+            let Some(triangle) = all.find(|corners| holds(corners, point)) else {
+                if is_excused(None) {
+                    proof.excused += 1;
+                    continue;
+                }
+                proof.uncovered += 1;
+                proof.first_uncovered = proof.first_uncovered.or(Some(point));
+                continue;
+            };
+            let [a, b, c] = *triangle;
+            // The height of the triangle below the point, times twice its area.
+            let [of_a, of_b, of_c] = [cross(b, c, point), cross(c, a, point), cross(a, b, point)];
+            let area = of_a + of_b + of_c;
+            let height = of_a * i128::from(a[2]) + of_b * i128::from(b[2]) + of_c * i128::from(c[2]);
+            let distance = (height - area * i128::from(point[2])).abs();
+            let is_beyond = distance * self.bound.per > self.bound.steps * area;
+            if is_beyond && is_excused(Some(*triangle)) {
                 proof.excused += 1;
                 continue;
             }
-            proof.uncovered += 1;
-            proof.first_uncovered = proof.first_uncovered.or(Some(point));
-            continue;
-        };
-        let [a, b, c] = *triangle;
-        // The height of the triangle below the point, times twice its area.
-        let [of_a, of_b, of_c] = [cross(b, c, point), cross(c, a, point), cross(a, b, point)];
-        let area = of_a + of_b + of_c;
-        let height = of_a * i128::from(a[2]) + of_b * i128::from(b[2]) + of_c * i128::from(c[2]);
-        let distance = (height - area * i128::from(point[2])).abs();
-        let is_beyond = distance * bound.per > bound.steps * area;
-        if is_beyond && is_excused(Some(*triangle)) {
-            proof.excused += 1;
-            continue;
+            proof.greatest = proof.greatest.max(distance as f64 / area as f64);
+            if is_beyond {
+                proof.beyond += 1;
+                proof.first_beyond = proof.first_beyond.or(Some(point));
+            }
         }
-        proof.greatest = proof.greatest.max(distance as f64 / area as f64);
-        if is_beyond {
-            proof.beyond += 1;
-            proof.first_beyond = proof.first_beyond.or(Some(point));
-        }
+        proof
     }
-    proof
+}
+
+/// Returns the pieces of a cell by smaller cells: its points, and its triangles where there are points.
+fn divided(triangles: &[Piece], points: &[Piece], side: i64, finer: i64) -> Vec<Piece> {
+    let mut pieces: Vec<Piece> = points.iter().map(|piece| Piece::of_point(piece.corners[0], finer)).collect();
+    let with_points: HashSet<[i32; 2]> = pieces.iter().map(|piece| piece.cell).collect();
+    for &Piece { cell, corners, .. } in triangles {
+        let first = cell.map(|along| (i64::from(along) * side).div_euclid(finer));
+        let last = cell.map(|along| ((i64::from(along) + 1) * side - 1).div_euclid(finer));
+        cells_of(corners, finer, [first, last], |cell| {
+            if with_points.contains(&cell) {
+                pieces.push(Piece { cell, kind: TRIANGLE, corners });
+            }
+        });
+    }
+    pieces
 }
 
 fn holds(corners: &[[i32; 3]; 3], point: [i32; 3]) -> bool {
@@ -281,6 +332,37 @@ mod tests {
         }
         let outside = proof_of(&[triangle], &[[2, 2, 0]], "1");
         assert_eq!((outside.uncovered, outside.first_uncovered), (1, Some([2, 2, 0])));
+    }
+
+    /// The first triangles are wide, so one cell holds the crowd.
+    #[test]
+    fn a_crowd_in_one_cell_is_compared_with_its_own_triangles() {
+        let folder = tempfile::tempdir().unwrap();
+        let surface = Surface::new(folder.path(), 1 << 20);
+        let wide = [[0, 0, 0], [900_000, 0, 0], [0, 900_000, 0]];
+        surface.add_triangles(&wide, &[[0, 1, 2]]).unwrap();
+        let side = 70;
+        let vertex = |i: i32| [-9_999 + i % side * 11, -9_999 + i / side * 11, i % 3];
+        let vertices: Vec<[i32; 3]> = (0..side * side).map(vertex).collect();
+        let squares = (0..side * (side - 1)).filter(|i| i % side < side - 1);
+        let triangles: Vec<[u32; 3]> = squares
+            .flat_map(|i| [[i, i + 1, i + side], [i + 1, i + side + 1, i + side]])
+            .map(|t| t.map(|v| v as u32))
+            .collect();
+        surface.add_triangles(&vertices, &triangles).unwrap();
+        let middle = |t: &[u32; 3]| {
+            let corners = t.map(|v| vertices[v as usize]);
+            let [x, y] = [0, 1].map(|k| corners.iter().map(|p| p[k]).sum::<i32>().div_euclid(3));
+            [x, y, 1]
+        };
+        let mut points: Vec<[i32; 3]> = triangles.iter().map(middle).collect();
+        points[77][2] = 500;
+        points.push([-10_005, -9_999, 0]);
+        surface.add_points(&points).unwrap();
+        let proof = surface.check(Bound::new(Decimal::from(2), Decimal::ONE).unwrap(), None).unwrap();
+        assert_eq!((proof.beyond, proof.first_beyond), (1, Some(points[77])));
+        assert_eq!((proof.uncovered, proof.first_uncovered), (1, points.last().copied()));
+        assert!((498.0..=500.0).contains(&proof.greatest), "{}", proof.greatest);
     }
 
     proptest! {
