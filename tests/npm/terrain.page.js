@@ -69,7 +69,7 @@ async function show({ places, views }) {
   scene.backgroundColor = Color.MAGENTA;
   scene.fog.enabled = false;
   Object.assign(scene.globe, { baseColor: Color.GRAY, enableLighting: false, showGroundAtmosphere: false, depthTestAgainstTerrain: true });
-  // Few pixels are drawn soon without a GPU; the tiles are those of a picture of 300 rows.
+  // Few pixels are drawn fast without a GPU; this makes up for them, so that as many tiles are shown as in a picture of 300 rows.
   scene.globe.maximumScreenSpaceError *= scene.canvas.height / 300;
   scene.imageryLayers.addImageryProvider(new UrlTemplateImageryProvider({ url: picture(), maximumLevel: 20 }));
 

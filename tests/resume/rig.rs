@@ -187,7 +187,7 @@ impl Rig {
         self.configure(&undisturbed);
         Run::start(&mut self.command()).end().succeeded();
         let out = self.folder.path().join("undisturbed");
-        // Whatever has the same bytes is proved too.
+        // Whatever has the same bytes is proved too, and a report is compared with its own checksum.
         let verdict = verify::verify(&out, 1 << 28).unwrap();
         assert_eq!(verdict.verdict, verify::Conclusion::Proved, "{verdict}");
         self.expected = files(&out);
@@ -287,6 +287,7 @@ impl Rig {
         let differ = self.expected.iter().filter(|(name, bytes)| found[*name] != **bytes);
         let differ: Vec<&String> = differ.map(|(name, _)| name).collect();
         assert!(differ.is_empty(), "{what}: other bytes in {differ:?}");
+        terrain::FinishedTerrain::open(&self.out()).unwrap_or_else(|error| panic!("{what}: {error}"));
         fs::read(self.out().join("report.json")).unwrap()
     }
 

@@ -26,7 +26,7 @@ const FEW_SITES: usize = 1000;
 /// The points of a block, and a triangulation in which every triangle that holds one of them is a triangle of all that is selected, in this
 /// block or elsewhere.
 pub(crate) struct Block {
-    /// The points that are looked at, neighbours in the plane one after the other.
+    /// The points that are looked at, those of each sample row by row of small cells.
     points: Vec<[i32; 3]>,
     /// Those that are not, likewise.
     later: Vec<[i32; 3]>,
@@ -212,7 +212,11 @@ impl Block {
             return;
         }
         let known = self.points.len() as u32;
-        self.points.extend(self.later.extract_if(.., |point| sample.has(*point)));
+        let later = std::mem::take(&mut self.later);
+        let (looked_at, later): (Vec<_>, Vec<_>) = later.into_iter().partition(|point| sample.has(*point));
+        self.points.reserve_exact(looked_at.len());
+        self.points.extend(looked_at);
+        self.later = later;
         self.next.resize(self.points.len(), NONE);
         self.displaced = (known..self.points.len() as u32).map(|point| (point, NONE)).collect();
         self.sample = sample;

@@ -196,7 +196,7 @@ impl<'a, E: Send> Rounds<'a, E> {
         let mut block = match state.block.take() {
             Some(block) if block.grows_by_far(&self.selected) => {
                 let (points, mut afar) = block.into_points();
-                // Those of them that were around the block need not be any more.
+                // A corner of the hull that was in the surroundings may lie outside the new ones.
                 afar.extend(&self.outline);
                 triangulated(points, &afar)?
             }

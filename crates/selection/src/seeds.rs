@@ -39,7 +39,8 @@ impl LatticeCells {
         1 << self.shift
     }
 
-    /// Returns cells of a quarter of the side, or of one step, and how many of them are along each side of one of these; `None` if that is one step.
+    /// Returns cells of a quarter of the side, or of one step, and how many of them lie along a side of these; `None` if these cells are one step
+    /// wide.
     pub(crate) fn finer(self) -> Option<(LatticeCells, i32)> {
         let shift = self.shift.saturating_sub(2);
         (shift < self.shift).then(|| (LatticeCells { shift, ..self }, 1 << (self.shift - shift)))

@@ -1,7 +1,7 @@
 //! Proves that points which are no vertices lie within a bound of the mesh along the vertical: `[output] max_error`.
 //!
 //! The plane is cut into square cells. A triangle goes to every cell that it may meet, a point to the one that it lies in, and what meets in
-//! a cell is compared. Whether a point lies in a triangle is decided with `robust`, and its distance in integers.
+//! a cell is compared; a cell with many of both is divided. Whether a point lies in a triangle is decided with `robust`, and its distance in integers.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -23,8 +23,11 @@ const TRIANGLES_PER_CELL: f64 = 32.0;
 /// A cell with more pairs of a triangle and a point is divided: where points are crowded, the side that suits the first mesh is far too long.
 const MOST_PAIRS: usize = 1 << 15;
 
-/// Along each side into so many.
+/// About so many smaller cells lie along its side.
 const DIVISIONS: i64 = 8;
+
+/// It stays whole if its triangles are in more of them than this, on average.
+const MOST_COPIES: usize = 4;
 
 /// A triangle or a point in a cell.
 #[repr(C)]
@@ -237,9 +240,13 @@ impl Comparison<'_> {
     /// Compares the points of a cell with its triangles, which come first, or else with those that are large.
     fn of_cell(&self, pieces: &[Piece], side: i64) -> SurfaceProof {
         let (triangles, points) = pieces.split_at(pieces.partition_point(|piece| piece.kind == TRIANGLE));
-        if triangles.len().saturating_mul(points.len()) > MOST_PAIRS && side > 1 {
-            let finer = (side / DIVISIONS).max(1);
-            return self.of_cells(&mut divided(triangles, points, side, finer), finer);
+        let is_crowded = triangles.len() > 1 && triangles.len().saturating_mul(points.len()) > MOST_PAIRS;
+        let finer = (side / DIVISIONS).max(1);
+        if is_crowded
+            && side > 1
+            && let Some(mut pieces) = divided(triangles, points, side, finer)
+        {
+            return self.of_cells(&mut pieces, finer);
         }
         let mut proof = SurfaceProof::default();
         for point in points.iter().map(|piece| piece.corners[0]) {
@@ -278,8 +285,9 @@ impl Comparison<'_> {
     }
 }
 
-/// Returns the pieces of a cell by smaller cells: its points, and its triangles where there are points.
-fn divided(triangles: &[Piece], points: &[Piece], side: i64, finer: i64) -> Vec<Piece> {
+/// Returns the pieces of a cell by smaller cells: its points, and its triangles where there are points. `None` if that does not help, because the
+/// triangles meet many of them.
+fn divided(triangles: &[Piece], points: &[Piece], side: i64, finer: i64) -> Option<Vec<Piece>> {
     let mut pieces: Vec<Piece> = points.iter().map(|piece| Piece::of_point(piece.corners[0], finer)).collect();
     let with_points: HashSet<[i32; 2]> = pieces.iter().map(|piece| piece.cell).collect();
     for &Piece { cell, corners, .. } in triangles {
@@ -290,8 +298,11 @@ fn divided(triangles: &[Piece], points: &[Piece], side: i64, finer: i64) -> Vec<
                 pieces.push(Piece { cell, kind: TRIANGLE, corners });
             }
         });
+        if pieces.len() > points.len() + MOST_COPIES * triangles.len() {
+            return None;
+        }
     }
-    pieces
+    Some(pieces)
 }
 
 fn holds(corners: &[[i32; 3]; 3], point: [i32; 3]) -> bool {
