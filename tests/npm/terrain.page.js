@@ -58,7 +58,7 @@ async function show({ places, views }) {
   const provider = await CesiumTerrainProvider.fromUrl('/out/terrain', { requestVertexNormals: true, requestWaterMask: true });
   const widget = new CesiumWidget('scene', {
     baseLayer: false, skyBox: false, skyAtmosphere: false, useDefaultRenderLoop: false, terrainProvider: new EllipsoidTerrainProvider(),
-    msaaSamples: 1, orderIndependentTranslucency: false, creditContainer: document.createElement('div'), contextOptions: { webgl: { preserveDrawingBuffer: true } },
+    creditContainer: document.createElement('div'), contextOptions: { webgl: { preserveDrawingBuffer: true } },
   });
   widget.resize();
   const { scene } = widget;

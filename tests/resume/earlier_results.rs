@@ -189,7 +189,7 @@ pub(crate) fn found_whole(rig: &Rig, count: u64) {
 #[test]
 fn a_job_without_room_on_the_disk_leaves_the_results_of_the_one_before() {
     let earlier = Earlier::new();
-    for kibibytes in [8, 64, 200] {
+    for kibibytes in [8, 48, 96] {
         let mut command = Command::new("bash");
         command.arg("-c").arg(format!("ulimit -f {kibibytes} && exec \"$0\" --force --restart job.toml"));
         command.arg(env!("CARGO_BIN_EXE_gdt-batch")).current_dir(earlier.rig.folder.path());
