@@ -53,7 +53,7 @@ impl CellSites {
         }
     }
 
-    /// Divides the cell of this `column` and `row` of `cells`.
+    /// Divides the cell into `lines` columns and rows of `finer` cells, of which the first has this column and row.
     fn divide(&mut self, finer: LatticeCells, first: [i32; 2], lines: usize) {
         let mut divided = SelectedSites::empty(finer, first, [lines; 2]);
         let points = std::mem::take(&mut self.points);
