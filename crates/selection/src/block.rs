@@ -1,11 +1,13 @@
 //! The triangulation of what is selected, as far as it concerns the points of one block.
 
+use crate::area::is_in;
 use crate::disc::Disc;
 use crate::error_bound::{Candidate, ErrorBound, VerticalError};
 use crate::mesh_of_points::{Held, MeshOfPoints, NONE, TriangleKey};
 use crate::near_points::{NearestTriangles, PointsByPlace};
 use crate::sample::Sample;
-use crate::selected_sites::{SelectedSites, is_in};
+use crate::selected_sites::SelectedSites;
+use crate::swap::Column;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
@@ -130,7 +132,10 @@ impl BlockErrors {
 impl Block {
     /// Returns the block of `points`, which lie in `bounds`, and what `selected` has near them. `afar` are others that are selected, among them the
     /// corners of the hull of the whole cloud that are not near. `triangulate` returns the canonical triangulation of sites.
-    pub(crate) fn new<E>(
+    ///
+    /// # Errors
+    /// Those of `triangulate` and of `selected`.
+    pub(crate) fn new<E: From<sys::Error>>(
         PointsByPlace { looked_at: points, later }: PointsByPlace,
         bounds: Bounds<2>,
         sample: Sample,
@@ -140,7 +145,7 @@ impl Block {
     ) -> Result<Block, E> {
         let all = points.len() + later.len();
         let around = surroundings(bounds, selected);
-        let mut known = selected.within(around);
+        let mut known = selected.within(around)?;
         known.extend(afar);
         let key = |value: i32| u64::from(value.cast_unsigned() ^ 1 << 31);
         radsort::sort_by_key(&mut known, |&[x, y, _]| key(y) << 32 | key(x));
@@ -166,7 +171,9 @@ impl Block {
             near,
         };
         block.place_displaced();
-        block.complete(selected, true);
+        // The list of all points is never as long again.
+        block.displaced = Vec::new();
+        block.complete(selected, true)?;
         Ok(block)
     }
 
@@ -174,6 +181,28 @@ impl Block {
     /// proposed what it has.
     pub(crate) fn settled_within(&self) -> Option<Bounds<2>> {
         (self.mesh.exceeding == 0).then_some(self.reach)
+    }
+
+    /// Returns all that it has of points, sites and triangles. No points are displaced between rounds.
+    pub(crate) fn columns(&mut self) -> Vec<&mut dyn Column> {
+        let Block { points, later, next, at_border, shared, near, mesh, .. } = self;
+        let mut columns: Vec<&mut dyn Column> = vec![points, later, next, at_border, shared, &mut near.triangles];
+        columns.extend(mesh.columns());
+        columns
+    }
+
+    /// Returns the bytes of memory that it takes.
+    pub(crate) fn bytes(&self) -> u64 {
+        let Block { points, later, next, displaced, at_border, shared, near, mesh, .. } = self;
+        let of_points = (points.capacity() + later.capacity()) * size_of::<[i32; 3]>()
+            + displaced.capacity() * size_of::<(u32, u32)>()
+            + (next.capacity() + at_border.capacity() + shared.capacity()) * size_of::<u32>();
+        (of_points + near.bytes() + mesh.bytes()) as u64
+    }
+
+    /// Returns the number of sites of its triangulation.
+    pub(crate) fn sites(&self) -> u64 {
+        self.mesh.sites.len() as u64
     }
 
     /// Tells whether so much has been added last to what is `selected` that it is faster to triangulate the block anew.
@@ -192,7 +221,10 @@ impl Block {
     }
 
     /// Inserts what has been added last to what is `selected`, as far as it concerns the block.
-    pub(crate) fn update(&mut self, selected: &SelectedSites) {
+    ///
+    /// # Errors
+    /// Those of `selected`.
+    pub(crate) fn update(&mut self, selected: &SelectedSites) -> sys::Result<()> {
         let mut concerns_border = false;
         for point in selected.newly_within(self.reach) {
             if is_in(&self.around, &point) {
@@ -203,13 +235,16 @@ impl Block {
             }
         }
         self.place_displaced();
-        self.complete(selected, concerns_border);
+        self.complete(selected, concerns_border)
     }
 
     /// Looks at the points of a sample that holds the present one.
-    pub(crate) fn look_at(&mut self, sample: Sample, selected: &SelectedSites) {
+    ///
+    /// # Errors
+    /// Those of `selected`.
+    pub(crate) fn look_at(&mut self, sample: Sample, selected: &SelectedSites) -> sys::Result<()> {
         if sample == self.sample {
-            return;
+            return Ok(());
         }
         let known = self.points.len() as u32;
         let later = std::mem::take(&mut self.later);
@@ -222,7 +257,8 @@ impl Block {
         self.sample = sample;
         self.mesh.changed = (0..self.mesh.held.len() as u32).collect();
         self.place_displaced();
-        self.complete(selected, true);
+        self.displaced = Vec::new();
+        self.complete(selected, true)
     }
 
     /// Returns the points of triangles whose distance is more than `bound`.
@@ -253,7 +289,7 @@ impl Block {
             let excess = self.mesh.excess_over(t, bound);
             let is_inside = self.is_inside(t);
             let held = &mut self.mesh.held[t];
-            held.is_inside = is_inside;
+            held.set_inside(is_inside);
             let before = std::mem::replace(&mut held.excess, excess);
             self.mesh.exceeding = self.mesh.exceeding + usize::from(excess > 0) - usize::from(before > 0);
         }
@@ -273,7 +309,7 @@ impl Block {
     /// Adds the worst point of a triangle to the proposal, if nothing that the block knows outdoes it. Tells whether other blocks may know more.
     fn propose_of(&self, t: usize, far: u64, proposal: &mut Proposal) -> bool {
         let candidate = self.candidate(t);
-        let triangle = (!self.mesh.held[t].is_inside).then(|| self.mesh.key(t));
+        let triangle = (!self.mesh.held[t].is_inside()).then(|| self.mesh.key(t));
         let mut beside = [None; 3];
         let mut is_outdone = false;
         for (k, twin) in self.mesh.twins_of(t).into_iter().enumerate() {
@@ -281,7 +317,7 @@ impl Block {
                 continue;
             }
             let other = twin.triangle();
-            match self.mesh.held[other].is_inside {
+            match self.mesh.held[other].is_inside() {
                 true => {
                     is_outdone |=
                         self.mesh.held[other].excess > 0 && !candidate.stands_beside(&self.candidate(other), far)
@@ -447,7 +483,7 @@ impl Block {
 
     /// Inserts selected points of other blocks until no triangle that holds points, or is beside one that does, has one in its circle. Those
     /// that did not change had none before the last points were selected, and unless these `concern_border` still have none.
-    fn complete(&mut self, selected: &SelectedSites, concern_border: bool) {
+    fn complete(&mut self, selected: &SelectedSites, concern_border: bool) -> sys::Result<()> {
         let mut unsure = self.mesh.changed_and_beside(0, Vec::new());
         for triangle in std::mem::take(&mut self.at_border) {
             if self.mesh.is_listed(triangle) {
@@ -468,7 +504,7 @@ impl Block {
             if disc.is_in(&self.around) {
                 continue;
             }
-            match selected.deepest_inside(corners, disc) {
+            match selected.deepest_inside(corners, disc)? {
                 None => {
                     self.at_border.push(triangle);
                     self.reach = self.reach.union(disc.bounds());
@@ -481,6 +517,7 @@ impl Block {
                 }
             }
         }
+        Ok(())
     }
 
     /// Tells whether a triangle or one beside it holds points.

@@ -10,10 +10,12 @@
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
+mod area;
 mod block;
 mod disc;
 mod error_bound;
 mod hull;
+mod memory;
 mod mesh_of_points;
 mod near_points;
 mod regions;
@@ -22,7 +24,10 @@ mod sample;
 mod seeds;
 mod select;
 mod selected_sites;
+mod site_cells;
 mod source;
+mod stored_sites;
+mod swap;
 #[cfg(test)]
 mod tests;
 
@@ -30,4 +35,5 @@ pub use error_bound::{ErrorBound, VerticalError};
 pub use rounds::{Figures, Selection};
 pub use select::select;
 pub use selected_sites::SelectedSites;
-pub use source::{BYTES_PER_LISTED, BYTES_PER_POINT, BYTES_PER_SELECTED, BlockPoints, PointSource};
+pub use source::{BYTES_PER_POINT, BlockPoints, PointSource, SelectionStore};
+pub use swap::SWAPPED;

@@ -1,6 +1,8 @@
 //! A triangulation that knows the points in its triangles.
 
 use crate::error_bound::{ErrorBound, VerticalError};
+use crate::swap::Column;
+use bytemuck::{Pod, Zeroable};
 use delaunay::geometry::Site;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
@@ -29,7 +31,8 @@ pub(crate) struct MeshOfPoints {
 }
 
 /// The points in a triangle.
-#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Held {
     /// The first of them.
     pub(crate) first: u32,
@@ -41,12 +44,12 @@ pub(crate) struct Held {
     pub(crate) excess: u64,
     /// The number of the list that the triangle was last put on.
     pub(crate) listed: u32,
-    /// It lies in the block, so that it holds no points of others.
-    pub(crate) is_inside: bool,
+    /// 1 if it lies in the block, so that it holds no points of others; else 0.
+    inside: u32,
 }
 
 impl Held {
-    const NOTHING: Held = Held { first: NONE, worst: NONE, numerator: [0; 2], excess: 0, listed: 0, is_inside: false };
+    const NOTHING: Held = Held { first: NONE, worst: NONE, numerator: [0; 2], excess: 0, listed: 0, inside: 0 };
 
     /// Returns that a triangle that was last put on a list holds nothing.
     #[inline(always)]
@@ -57,6 +60,16 @@ impl Held {
     #[inline(always)]
     pub(crate) fn numerator(&self) -> u128 {
         u128::from(self.numerator[0]) << 64 | u128::from(self.numerator[1])
+    }
+
+    /// Tells whether the triangle lies in the block, so that it holds no points of others.
+    #[inline(always)]
+    pub(crate) fn is_inside(&self) -> bool {
+        self.inside == 1
+    }
+
+    pub(crate) fn set_inside(&mut self, is_inside: bool) {
+        self.inside = u32::from(is_inside);
     }
 
     #[inline(always)]
@@ -79,6 +92,22 @@ impl MeshOfPoints {
             exceeding: 0,
             list: 0,
         }
+    }
+
+    /// Returns all that it has of sites and triangles.
+    pub(crate) fn columns(&mut self) -> [&mut dyn Column; 6] {
+        let MeshOfPoints { sites, heights, mesh, held, changed, .. } = self;
+        [sites, heights, &mut mesh.triangles, &mut mesh.twins, held, changed]
+    }
+
+    /// Returns the bytes of memory that it takes.
+    pub(crate) fn bytes(&self) -> usize {
+        let MeshOfPoints { sites, heights, mesh, held, changed, .. } = self;
+        sites.capacity() * size_of::<Site>()
+            + (heights.capacity() + changed.capacity()) * size_of::<u32>()
+            + mesh.triangles.capacity() * size_of::<[u32; 3]>()
+            + mesh.twins.capacity() * size_of::<HalfEdgeIndex>()
+            + held.capacity() * size_of::<Held>()
     }
 
     /// Returns those of the triangles that have changed, from the `first` of them on, and those beside them, each once, and `more`. If as many have

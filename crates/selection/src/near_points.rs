@@ -7,7 +7,7 @@ use delaunay::geometry::square_grid::SquareGrid;
 /// For each square of a block, the number of a triangle in or near it.
 pub(crate) struct NearestTriangles {
     grid: SquareGrid,
-    triangles: Vec<u32>,
+    pub(crate) triangles: Vec<u32>,
 }
 
 impl NearestTriangles {
@@ -17,6 +17,11 @@ impl NearestTriangles {
     pub(crate) fn new(bounds: Bounds<2>, points: usize) -> NearestTriangles {
         let grid = grid_of(bounds, points, NearestTriangles::POINTS);
         NearestTriangles { grid, triangles: vec![0; grid.cells()] }
+    }
+
+    /// Returns the bytes of memory that they take.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&self.triangles[..])
     }
 
     pub(crate) fn of(&self, [x, y, _]: [i32; 3]) -> u32 {

@@ -5,9 +5,10 @@
 //!
 //! Regions are cells of the lattice, and how large they are depends on the number of the points and their box alone. So does the result.
 
+use crate::memory::BlockMemory;
 use crate::rounds::BlockState;
 use crate::seeds::LatticeCells;
-use crate::source::{BlockPoints, PointSource};
+use crate::source::{BlockPoints, PointSource, SelectionStore};
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use rayon::prelude::*;
@@ -36,21 +37,22 @@ pub(crate) struct Division<'a, E> {
     pub(crate) regions: Vec<Region<'a, E>>,
 }
 
-/// Divides a cloud, which has `points` points in `bounds`. Points of its blocks that are in memory do not stay there.
+/// Divides a cloud, which has `points` points in `bounds`. Points of its blocks that are in `memory` do not stay there.
 ///
 /// # Errors
 /// Those of `source`.
-pub(crate) fn divide<E: Send>(
-    source: &dyn PointSource<Error = E>,
+pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
+    source: &'a dyn PointSource<Error = E>,
     blocks: Vec<BlockState>,
+    memory: &BlockMemory,
     bounds: Bounds<2>,
     points: u64,
     sizes: RegionSizes,
-) -> Result<Division<'_, E>, E> {
+) -> Result<Division<'a, E>, E> {
     let cells = LatticeCells::new(bounds, points, sizes.points, source.offset());
     let share = |(number, mut state): (usize, BlockState)| {
         let mut shares = BTreeMap::<[i32; 2], Bounds<2>>::new();
-        for [x, y, _] in state.take_points(source, number)? {
+        for [x, y, _] in state.take_points(source, memory, number)? {
             shares.entry(cells.of(x, y)).or_insert(Bounds::of_point([x, y])).include([x, y]);
         }
         Ok((state, shares))
@@ -66,7 +68,8 @@ pub(crate) fn divide<E: Send>(
             of_region.push(block);
         }
     }
-    let region = |(cell, (bounds, blocks))| Region { source, cells, cell, blocks, bounds };
+    let region =
+        |(cell, (bounds, blocks))| Region { source, cells, cell, blocks, bounds, selected_before: 0, taken: 0 };
     Ok(Division { blocks, regions: regions.into_iter().map(region).collect() })
 }
 
@@ -79,9 +82,19 @@ pub(crate) struct Region<'a, E> {
     blocks: Vec<usize>,
     /// The box of its points.
     pub(crate) bounds: Bounds<2>,
+    /// The number of points that are selected from other regions, and the bytes of memory that they take.
+    selected_before: u64,
+    taken: u64,
 }
 
-impl<E: Send> PointSource for Region<'_, E> {
+impl<E> Region<'_, E> {
+    /// Returns the region when so many points are `selected` from others, which take so many bytes of memory.
+    pub(crate) fn after(&self, selected: u64, taken: u64) -> Self {
+        Region { blocks: self.blocks.clone(), selected_before: selected, taken, ..*self }
+    }
+}
+
+impl<E: Send + From<sys::Error>> PointSource for Region<'_, E> {
     type Error = E;
 
     fn blocks(&self) -> usize {
@@ -104,8 +117,12 @@ impl<E: Send> PointSource for Region<'_, E> {
         self.source.triangulate(sites)
     }
 
-    fn keeps_blocks(&self, points: u64, selected: u64) -> bool {
-        self.source.keeps_blocks(points, selected)
+    fn memory(&self) -> u64 {
+        self.source.memory().saturating_sub(self.taken)
+    }
+
+    fn store(&self) -> Option<&dyn SelectionStore> {
+        self.source.store()
     }
 
     fn asks_about(&self, _: [Site; 3]) -> bool {
@@ -114,6 +131,6 @@ impl<E: Send> PointSource for Region<'_, E> {
     }
 
     fn after_round(&self, round: u32, selected: u64) -> Result<(), E> {
-        self.source.after_round(round, selected)
+        self.source.after_round(round, self.selected_before + selected)
     }
 }

@@ -6,11 +6,13 @@
 
 use crate::block::{Block, BlockErrors, Proposal, SharedCandidate, Undecided, far_above};
 use crate::error_bound::{Candidate, ErrorBound};
+use crate::memory::BlockMemory;
 use crate::mesh_of_points::TriangleKey;
 use crate::near_points::PointsByPlace;
 use crate::sample::{Sample, bound_of_samples, very_far_above};
 use crate::selected_sites::SelectedSites;
-use crate::source::{BlockPoints, PointSource};
+use crate::source::{BYTES_PER_LISTED, BlockPoints, PointSource};
+use crate::swap::{Place, SwapSpace, SwappedBlock};
 use delaunay::geometry::{Bounds, Site};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -36,9 +38,9 @@ pub struct Figures {
 
 /// Selected points, and what is known of them.
 #[derive(Debug)]
-pub struct Selection {
+pub struct Selection<'a> {
     /// The selected points.
-    pub sites: SelectedSites,
+    pub sites: SelectedSites<'a>,
     /// Its figures.
     pub figures: Figures,
     /// The triangles that hold points, of those that the source asks about, in order: their corners in ascending order, and how many.
@@ -53,6 +55,12 @@ pub(crate) struct BlockState {
     /// Its points, if they stay in memory until it is triangulated.
     pub(crate) loaded: Option<BlockPoints>,
     block: Option<Block>,
+    /// What that takes of the memory.
+    block_bytes: u64,
+    /// The block, if the memory does not hold it.
+    swapped: Option<SwappedBlock>,
+    /// Its place in the file.
+    place: Option<Place>,
     /// If the block has nothing to propose: where points must be selected before that changes.
     settled: Option<Bounds<2>>,
 }
@@ -64,19 +72,24 @@ impl BlockState {
         BlockState { bounds, points: points.len() as u64, ..BlockState::default() }
     }
 
-    /// Takes the points of the block with this number, from memory if they are there.
+    /// Returns the points of the block with this number, from `memory` if they wait there.
     ///
     /// # Errors
     /// Those of the source.
-    pub(crate) fn take_points<E: Send>(
+    pub(crate) fn take_points<E: Send + From<sys::Error>>(
         &mut self,
         source: &dyn PointSource<Error = E>,
+        memory: &BlockMemory,
         index: usize,
     ) -> Result<Vec<[i32; 3]>, E> {
-        let loaded = self.loaded.take();
-        Ok(loaded.map_or_else(|| source.load(index), Ok)?.points)
+        let Some(loaded) = self.loaded.take() else { return Ok(source.load(index)?.points) };
+        memory.take_points(self.points);
+        Ok(loaded.points)
     }
 }
+
+/// One of so many bytes of the memory is for the list of selected points; those that it does not hold wait in a file.
+const LISTED_SHARE: u64 = 4;
 
 /// A selection under way.
 pub(crate) struct Rounds<'a, E> {
@@ -84,39 +97,62 @@ pub(crate) struct Rounds<'a, E> {
     /// The corners of the hull of the cloud.
     outline: Vec<[i32; 3]>,
     blocks: Vec<Mutex<BlockState>>,
-    selected: SelectedSites,
+    selected: SelectedSites<'a>,
+    memory: BlockMemory,
+    swap: SwapSpace,
     /// The points that are looked at.
     sample: Sample,
     figures: Figures,
 }
 
-impl<'a, E: Send> Rounds<'a, E> {
-    /// Returns the rounds for a cloud of `points` points in `bounds`, before anything is known of its blocks.
-    pub(crate) fn new(source: &'a dyn PointSource<Error = E>, bounds: Bounds<2>, points: u64) -> Rounds<'a, E> {
+impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
+    /// Returns the rounds for a cloud in `bounds`. The points of its blocks may wait in `memory`.
+    pub(crate) fn new(
+        source: &'a dyn PointSource<Error = E>,
+        blocks: Vec<BlockState>,
+        bounds: Bounds<2>,
+        memory: BlockMemory,
+    ) -> Rounds<'a, E> {
+        let points = blocks.iter().map(|state| state.points).sum();
+        let most_in_memory = source.memory() / LISTED_SHARE / BYTES_PER_LISTED;
         Rounds {
             source,
             outline: Vec::new(),
-            blocks: Vec::new(),
-            selected: SelectedSites::none(bounds, points),
+            blocks: blocks.into_iter().map(Mutex::new).collect(),
+            selected: SelectedSites::none(bounds, points, source.store(), most_in_memory),
+            memory,
+            swap: SwapSpace::default(),
             sample: Sample::all(source.offset()),
-            figures: Figures::default(),
+            figures: Figures { points, ..Figures::default() },
         }
     }
 
-    /// Tells what is known of all blocks, the corners of the hull of the cloud, what is selected first, and the rounds that this took.
-    pub(crate) fn begin(&mut self, blocks: Vec<BlockState>, outline: Vec<[i32; 3]>, first: Vec<[i32; 3]>, rounds: u32) {
-        self.figures.points = blocks.iter().map(|state| state.points).sum();
-        self.figures.rounds = rounds;
-        self.blocks = blocks.into_iter().map(Mutex::new).collect();
-        self.outline = outline;
-        self.selected.add(first);
+    /// Selects points before the first round.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`].
+    pub(crate) fn add(&mut self, first: Vec<[i32; 3]>) -> sys::Result<()> {
+        self.selected.add(first)
     }
 
-    /// Does all rounds, over these samples one after the other, and returns what they select. Of points on one line that is all of them.
+    /// Returns the number of selected points, and the bytes of memory that they take.
+    pub(crate) fn selected(&self) -> [u64; 2] {
+        [self.selected.count(), self.selected.bytes()]
+    }
+
+    /// Does all rounds, over these samples one after the other, and returns what they select. Of points on one line that is all of them. `outline` are
+    /// the corners of the hull of the cloud; so many `rounds` have been done.
     ///
     /// # Errors
     /// Those of the source.
-    pub(crate) fn run(mut self, bound: ErrorBound, samples: impl Iterator<Item = Sample>) -> Result<Selection, E> {
+    pub(crate) fn run(
+        mut self,
+        outline: Vec<[i32; 3]>,
+        rounds: u32,
+        bound: ErrorBound,
+        samples: impl Iterator<Item = Sample>,
+    ) -> Result<Selection<'a>, E> {
+        (self.outline, self.figures.rounds) = (outline, rounds);
         if self.outline.len() < 3 {
             return self.select_all();
         }
@@ -158,7 +194,7 @@ impl<'a, E: Send> Rounds<'a, E> {
     /// Selects what a round has found. Tells whether that is any point.
     fn add_round(&mut self, found: impl Iterator<Item = [i32; 3]>) -> Result<bool, E> {
         let before = self.selected.count();
-        self.selected.add(found);
+        self.selected.add(found)?;
         if self.selected.count() == before {
             return Ok(false);
         }
@@ -193,7 +229,7 @@ impl<'a, E: Send> Rounds<'a, E> {
             let triangulate = |sites: &[Site]| self.source.triangulate(sites);
             Block::new(points, bounds, self.sample, &self.selected, afar, triangulate)
         };
-        let mut block = match state.block.take() {
+        let mut block = match self.take_block(state)? {
             Some(block) if block.grows_by_far(&self.selected) => {
                 let (points, mut afar) = block.into_points();
                 // A corner of the hull that was in the surroundings may lie outside the new ones.
@@ -201,27 +237,58 @@ impl<'a, E: Send> Rounds<'a, E> {
                 triangulated(points, &afar)?
             }
             Some(mut block) => {
-                block.update(&self.selected);
-                block.look_at(self.sample, &self.selected);
+                block.update(&self.selected)?;
                 block
             }
             None => {
-                let points = state.take_points(self.source, index)?;
+                let points = state.take_points(self.source, &self.memory, index)?;
                 triangulated(PointsByPlace::of(&points, bounds, self.sample), &self.outline)?
             }
         };
+        block.look_at(self.sample, &self.selected)?;
         let done = work(&mut block);
-        state.block = Some(block).filter(|_| self.source.keeps_blocks(self.figures.points, self.selected.count()));
+        self.put_block(block, state)?;
         Ok(done)
     }
 
-    fn finish(mut self) -> Result<Selection, E> {
+    /// Takes a block from where it waits.
+    fn take_block(&self, state: &mut BlockState) -> Result<Option<Block>, E> {
+        self.memory.release(std::mem::take(&mut state.block_bytes));
+        let swapped = state.swapped.take().zip(self.source.store());
+        let Some((swapped, store)) = swapped else { return Ok(state.block.take()) };
+        Ok(Some(swapped.read(store)?))
+    }
+
+    /// Lets a block wait in memory, or in the file if the memory does not hold it. If that has no space either, the block is made again when it is
+    /// needed.
+    fn put_block(&self, block: Block, state: &mut BlockState) -> Result<(), E> {
+        let bytes = block.bytes();
+        if self.memory.keeps_block(state.points, block.sites(), bytes, self.selected.bytes()) {
+            (state.block, state.block_bytes) = (Some(block), bytes);
+        } else if let Some(store) = self.source.store() {
+            state.place = self.swap.place(bytes, state.place.take(), store)?;
+            state.swapped = state.place.map(|place| SwappedBlock::write(block, place, store)).transpose()?;
+        }
+        Ok(())
+    }
+
+    /// Forgets a block.
+    fn drop_block(&self, state: &mut BlockState) -> Result<(), E> {
+        (state.block, state.swapped) = (None, None);
+        self.memory.release(std::mem::take(&mut state.block_bytes));
+        if let Some((place, store)) = state.place.take().zip(self.source.store()) {
+            self.swap.free(place, store)?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Selection<'a>, E> {
         let errors = (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|index| {
             let mut state = self.blocks[index].lock().unwrap_or_else(PoisonError::into_inner);
             let errors =
                 self.with_block(index, &mut state, |block| block.errors(|corners| self.source.asks_about(corners)));
             // Nothing needs it any more.
-            state.block = None;
+            self.drop_block(&mut state)?;
             errors
         });
         let errors: BlockErrors = errors.try_reduce(BlockErrors::default, |a, b| Ok(a.join(b)))?;
@@ -242,10 +309,10 @@ impl<'a, E: Send> Rounds<'a, E> {
     }
 
     /// Selects all points.
-    fn select_all(self) -> Result<Selection, E> {
+    fn select_all(self) -> Result<Selection<'a>, E> {
         let mut selected = self.selected.emptied();
         for block in 0..self.source.blocks() {
-            selected.add(self.source.load(block)?.points);
+            selected.add(self.source.load(block)?.points)?;
         }
         let figures = Figures { points: self.figures.points, selected: selected.count(), ..Figures::default() };
         Ok(Selection { sites: selected, figures, holding: Vec::new() })

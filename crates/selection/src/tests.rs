@@ -8,26 +8,61 @@ use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::triangulation::canonical;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
+use std::sync::Mutex;
+
+/// Memory that stands for a file. What is free is filled with ones.
+#[derive(Debug, Default)]
+pub(crate) struct Waiting(Mutex<Vec<u8>>);
+
+impl SelectionStore for Waiting {
+    fn reserve(&self, bytes: u64) -> u64 {
+        let mut all = self.0.lock().unwrap();
+        let at = all.len() as u64;
+        all.resize((at + bytes) as usize, 255);
+        at
+    }
+
+    fn write(&self, at: u64, bytes: &[u8]) -> sys::Result<()> {
+        self.0.lock().unwrap()[at as usize..][..bytes.len()].copy_from_slice(bytes);
+        Ok(())
+    }
+
+    fn read(&self, at: u64, bytes: &mut [u8]) -> sys::Result<()> {
+        bytes.copy_from_slice(&self.0.lock().unwrap()[at as usize..][..bytes.len()]);
+        Ok(())
+    }
+
+    fn free(&self, at: u64, bytes: u64) -> sys::Result<()> {
+        self.0.lock().unwrap()[at as usize..][..bytes as usize].fill(255);
+        Ok(())
+    }
+}
 
 /// A cloud cut into blocks of equal columns and rows.
 struct Cloud {
     blocks: Vec<BlockPoints>,
-    keeps_blocks: bool,
+    memory: u64,
+    waiting: Waiting,
     offset: [i64; 2],
 }
 
+/// So much memory holds all of a cloud of these tests.
+const AMPLE: u64 = 1 << 40;
+/// So much holds some of its blocks.
+const SCARCE: u64 = 1 << 20;
+
 impl Cloud {
-    fn new(points: &[[i32; 3]], fixed: &[[i32; 3]], side: i32, keeps_blocks: bool) -> Cloud {
+    fn new(points: &[[i32; 3]], fixed: &[[i32; 3]], side: i32, memory: u64) -> Cloud {
         let mut blocks = std::collections::BTreeMap::<[i32; 2], BlockPoints>::new();
         let cell = |p: &[i32; 3]| [p[0].div_euclid(side), p[1].div_euclid(side)];
         points.iter().for_each(|p| blocks.entry(cell(p)).or_default().points.push(*p));
         fixed.iter().for_each(|p| blocks.entry(cell(p)).or_default().fixed.push(*p));
-        Cloud { blocks: blocks.into_values().collect(), keeps_blocks, offset: [0; 2] }
+        Cloud { blocks: blocks.into_values().collect(), memory, waiting: Waiting::default(), offset: [0; 2] }
     }
 }
 
 impl PointSource for Cloud {
-    type Error = delaunay::Error;
+    type Error = sys::Error;
 
     fn blocks(&self) -> usize {
         self.blocks.len()
@@ -37,25 +72,34 @@ impl PointSource for Cloud {
         self.offset
     }
 
-    fn load(&self, block: usize) -> Result<BlockPoints, delaunay::Error> {
+    fn load(&self, block: usize) -> sys::Result<BlockPoints> {
         Ok(self.blocks[block].clone())
     }
 
-    fn triangulate(&self, sites: &[Site]) -> Result<HalfEdgeMesh, delaunay::Error> {
-        canonical(sites)
+    fn triangulate(&self, sites: &[Site]) -> sys::Result<HalfEdgeMesh> {
+        triangulated_sites(sites)
     }
 
-    fn keeps_blocks(&self, _: u64, _: u64) -> bool {
-        self.keeps_blocks
+    fn memory(&self) -> u64 {
+        self.memory
+    }
+
+    fn store(&self) -> Option<&dyn SelectionStore> {
+        Some(&self.waiting)
     }
 
     fn asks_about(&self, _: [Site; 3]) -> bool {
         true
     }
 
-    fn after_round(&self, _: u32, _: u64) -> Result<(), delaunay::Error> {
+    fn after_round(&self, _: u32, _: u64) -> sys::Result<()> {
         Ok(())
     }
+}
+
+/// Returns the canonical triangulation of `sites`.
+fn triangulated_sites(sites: &[Site]) -> sys::Result<HalfEdgeMesh> {
+    canonical(sites).map_err(|error| sys::Error::Broken(error.to_string()))
 }
 
 fn bounds_of(points: &[[i32; 3]]) -> Bounds<2> {
@@ -67,12 +111,13 @@ fn selected(
     fixed: &[[i32; 3]],
     side: i32,
     bound: ErrorBound,
-    keeps: bool,
+    memory: u64,
 ) -> (Vec<[i32; 3]>, Figures) {
     let bounds = bounds_of(points);
-    let Selection { sites, figures, holding } = select(&Cloud::new(points, fixed, side, keeps), bound).unwrap();
-    holds_the_others(&sites.within(bounds).into_iter().collect::<BTreeSet<_>>(), points, &holding);
-    let mut all: Vec<_> = sites.within(bounds);
+    let cloud = Cloud::new(points, fixed, side, memory);
+    let Selection { sites, figures, holding } = select(&cloud, bound).unwrap();
+    let mut all: Vec<_> = sites.within(bounds).unwrap();
+    holds_the_others(&all.iter().copied().collect::<BTreeSet<_>>(), points, &holding);
     all.sort_unstable();
     (all, figures)
 }
@@ -193,8 +238,8 @@ proptest! {
             _ => (x / 3 * 7 + y / 2 * 3) % 11,
         });
         let bound = ErrorBound::new(bound.0, bound.1);
-        let (found, figures) = selected(&points, &[], side, bound, true);
-        let (again, _) = selected(&points, &[], 100_000, bound, false);
+        let (found, figures) = selected(&points, &[], side, bound, AMPLE);
+        let (again, _) = selected(&points, &[], 100_000, bound, 0);
         prop_assert_eq!(&found, &again);
         prop_assert_eq!(found.len() as u64, figures.selected);
         // Every point is within the bound.
@@ -210,18 +255,18 @@ proptest! {
 #[test]
 fn a_plane_takes_its_corners_and_a_line_all_points() {
     let plane: Vec<[i32; 3]> = (0..10_000).map(|i| [i % 100, i / 100, 3 * (i % 100) - 2 * (i / 100)]).collect();
-    let (found, figures) = selected(&plane, &[], 30, ErrorBound::new(0, 1), true);
+    let (found, figures) = selected(&plane, &[], 30, ErrorBound::new(0, 1), AMPLE);
     assert!(found.len() <= 4 + 16, "{}", found.len());
     assert_eq!((figures.greatest, figures.rounds, figures.points), (0, 0, 10_000));
     let line: Vec<[i32; 3]> = (0..100).map(|i| [i, 2 * i, i % 7]).collect();
-    assert_eq!(selected(&line, &[], 30, ErrorBound::new(1, 1), true).0, line);
+    assert_eq!(selected(&line, &[], 30, ErrorBound::new(1, 1), AMPLE).0, line);
 }
 
 #[test]
 fn fixed_points_are_selected() {
     let plane: Vec<[i32; 3]> = (0..400).map(|i| [i % 20, i / 20, 0]).collect();
     let fixed = [[7, 8, 0], [9, 13, 0]];
-    let (found, _) = selected(&plane, &fixed, 6, ErrorBound::new(1, 1), true);
+    let (found, _) = selected(&plane, &fixed, 6, ErrorBound::new(1, 1), AMPLE);
     assert!(fixed.iter().all(|p| found.contains(p)));
 }
 
@@ -237,9 +282,9 @@ fn blocks_far_apart_agree() {
     }
     let points: Vec<[i32; 3]> = points.into_iter().map(|[x, y]| [x, y, hill(x, y)]).collect();
     let bound = ErrorBound::new(9, 2);
-    let whole = selected(&points, &[], 100_000_000, bound, true);
-    for (side, keeps) in [(100, true), (333, false), (1000, true)] {
-        assert_eq!(selected(&points, &[], side, bound, keeps), whole);
+    let whole = selected(&points, &[], 100_000_000, bound, AMPLE);
+    for (side, memory) in [(100, AMPLE), (333, 0), (400, SCARCE), (1000, AMPLE)] {
+        assert_eq!(selected(&points, &[], side, bound, memory), whole);
     }
     assert!(whole.1.greatest <= 9 << 19 && whole.0.len() > 1000 && whole.0.len() < points.len());
 }
@@ -265,13 +310,13 @@ fn rounds_select_about_as_many_points_as_greedy_insertion() {
     let (bounds, hull) = (bounds_of(&points), crate::hull::hull_corners(points.clone()));
     for steps in [4, 12, 40, 120, 400] {
         let bound = ErrorBound::new(steps, 1);
-        let mut known = SelectedSites::none(bounds, points.len() as u64);
-        known.add(hull.iter().copied());
+        let mut known = SelectedSites::none(bounds, points.len() as u64, None, 0);
+        known.add(hull.iter().copied()).unwrap();
         let whole = Sample::all([0; 2]);
         let all = crate::near_points::PointsByPlace::of(&points, bounds, whole);
-        let block = crate::block::Block::new(all, bounds, whole, &known, &hull, canonical).unwrap();
+        let block = crate::block::Block::new(all, bounds, whole, &known, &hull, triangulated_sites).unwrap();
         let greedy = crate::block::greedy_insertion(block, &mut known, bound);
-        let (found, figures) = selected(&points, &[], 4_000, bound, true);
+        let (found, figures) = selected(&points, &[], 4_000, bound, AMPLE);
         assert!(greedy > 40 && found.len() as u64 * 100 <= greedy * 108, "{steps}: {} and {greedy}", found.len());
         assert!(figures.rounds > 2);
     }
@@ -283,15 +328,15 @@ fn a_block_beside_a_crowd_takes_little_of_it() {
     let sparse: Vec<[i32; 3]> = (0..400).map(|i| [i % 20 * 2_500, i / 20 * 5_000, i % 7]).collect();
     let corners = [[0, 0, 0], [100_000, 0, 0], [0, 100_000, 0], [100_000, 100_000, 0]];
     let all: Vec<[i32; 3]> = crowd.iter().chain(&sparse).chain(&corners[1..]).copied().collect();
-    let mut known = SelectedSites::none(bounds_of(&all), all.len() as u64);
-    known.add(all);
+    let mut known = SelectedSites::none(bounds_of(&all), all.len() as u64, None, 0);
+    known.add(all).unwrap();
     let bounds = bounds_of(&sparse);
     let whole = Sample::all([0; 2]);
     let points = crate::near_points::PointsByPlace::of(&sparse, bounds, whole);
     let mut triangulated = 0;
     let triangulate = |sites: &[Site]| {
         triangulated = sites.len();
-        canonical(sites)
+        triangulated_sites(sites)
     };
     crate::block::Block::new(points, bounds, whole, &known, &corners, triangulate).unwrap();
     assert!((400..2_500).contains(&triangulated), "{triangulated}");
@@ -305,10 +350,10 @@ fn a_crowd_does_not_depend_on_blocks() {
     let strip = (0..20_000).map(|i| [i * 499 + i % 7, 4_999_000 + i * 31 % 1_999, rough(i)]);
     let points: Vec<[i32; 3]> = spread.chain(strip).collect();
     let bound = ErrorBound::new(12, 1);
-    let one = selected(&points, &[], 100_000_000, bound, true);
+    let one = selected(&points, &[], 100_000_000, bound, AMPLE);
     assert!((5_000..21_000).contains(&one.0.len()), "{}", one.0.len());
     for side in [625_000, 1_250_000, 5_000_000] {
-        assert!(selected(&points, &[], side, bound, true) == one, "blocks of {side}");
+        assert!(selected(&points, &[], side, bound, AMPLE) == one, "blocks of {side}");
     }
 }
 
@@ -322,24 +367,24 @@ fn regions_depend_on_the_points_alone() {
     clouds[1].extend((0..50).map(|i| [40_000 + 100 * i, 90_000, i % 7]));
     for points in clouds {
         let bound = ErrorBound::new(12, 1);
-        let run = |side: i32, keeps: bool, offset: [i32; 2]| {
+        let run = |side: i32, memory: u64, offset: [i32; 2]| {
             let moved = |[x, y, z]: [i32; 3]| [x - offset[0], y - offset[1], z];
             let back = |[x, y, z]: [i32; 3]| [x + offset[0], y + offset[1], z];
             let points: Vec<[i32; 3]> = points.iter().copied().map(moved).collect();
-            let mut cloud = Cloud::new(&points, &points[700..702], side, keeps);
+            let mut cloud = Cloud::new(&points, &points[700..702], side, memory);
             cloud.offset = offset.map(i64::from);
             let bounds = bounds_of(&points);
             let found = crate::select::select_by_regions(&cloud, bound, sizes).unwrap();
-            let mut all: Vec<_> = found.sites.within(bounds).into_iter().map(back).collect();
+            let mut all: Vec<_> = found.sites.within(bounds).unwrap().into_iter().map(back).collect();
             all.sort_unstable();
             let worst = found.figures.worst.map(back);
             (all, Figures { worst, ..found.figures })
         };
-        let (found, figures) = run(1_000_000, true, [0; 2]);
+        let (found, figures) = run(1_000_000, AMPLE, [0; 2]);
         let others =
-            [(17, true, [0; 2]), (900, false, [0; 2]), (3_000, true, [12_345, -999]), (700, false, [-1_000_003, 1])];
-        for (side, keeps, offset) in others {
-            assert_eq!(run(side, keeps, offset), (found.clone(), figures), "blocks of {side}, {offset:?}");
+            [(17, SCARCE, [0; 2]), (900, 0, [0; 2]), (3_000, AMPLE, [12_345, -999]), (700, 0, [-1_000_003, 1])];
+        for (side, memory, offset) in others {
+            assert_eq!(run(side, memory, offset), (found.clone(), figures), "blocks of {side}, {offset:?}");
         }
         let chosen: BTreeSet<_> = found.iter().copied().collect();
         assert_eq!(worst_points(&points, &chosen, bound), Vec::new());

@@ -1,12 +1,14 @@
 //! A file of a step's own, in which pieces of a result wait until all are there. Threads may add some in any order.
 
 use std::fs::File;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use sys::positional_io::read_exact_at;
 use sys::{Error, Result, disk, fault};
 
 /// A file of pieces.
+#[derive(Debug)]
 pub(crate) struct WaitingFile {
     path: PathBuf,
     file: File,
@@ -53,6 +55,14 @@ impl WaitingFile {
     pub(crate) fn read(&self, bytes: &mut [u8], at: u64) -> Result<()> {
         let read = fault::read("read-result").and_then(|()| read_exact_at(&self.file, bytes, at));
         read.map_err(Error::io("read", &self.path))
+    }
+
+    /// Gives the space of bytes back that are no longer needed.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(crate) fn free(&self, bytes: Range<u64>) -> Result<()> {
+        disk::free(&self.file, &[bytes]).map(drop).map_err(Error::io("write", &self.path))
     }
 
     /// Removes the file.

@@ -8,4 +8,5 @@ pub mod leaf;
 pub mod merge;
 pub mod precision_limit;
 pub(crate) mod selection;
+pub(crate) mod selection_file;
 pub mod sites;

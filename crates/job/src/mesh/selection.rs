@@ -4,18 +4,17 @@
 use crate::durable::directory::JobDirectory;
 use crate::index::{PartIndex, TileIndex};
 use crate::mesh::hull_rule::HullRule;
+use crate::mesh::selection_file::SelectionFile;
 use crate::mesh::sites::load_sites;
-use crate::options::JobOptions;
 use crate::partition::bucket_sorter::BucketSorter;
 use crate::partition::buckets::Buckets;
 use crate::partition::part_points::{ReadBlocks, file_of_selected};
 use crate::partition::parts::Parts;
 use crate::partition::point_file::{PointFile, PointFiles};
 use crate::partition::result::Partition;
-use crate::plan::budget::{BYTES_PER_LEAF_SITE, read_buffer_memory, working_memory};
+use crate::plan::budget::{read_buffer_memory, selection_memory};
 use crate::plan::ground_cells::{too_many_cells, too_many_squares};
 use crate::plan::job_plan::Plan;
-use crate::progress::number_text::grouped;
 use crate::{Error, Result};
 use delaunay::geometry::Site;
 use delaunay::mesh::half_edge::HalfEdgeMesh;
@@ -24,9 +23,7 @@ use ground::{CoveredArea, Ground, LowestHeights, MetricLattice, PointCollector};
 use points::Point;
 use rayon::prelude::*;
 use rust_decimal::Decimal;
-use selection::{
-    BYTES_PER_LISTED, BYTES_PER_POINT, BYTES_PER_SELECTED, BlockPoints, ErrorBound, PointSource, SelectedSites,
-};
+use selection::{BYTES_PER_POINT, BlockPoints, ErrorBound, PointSource, SelectedSites, SelectionStore};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use sys::{fault, interrupt};
@@ -35,10 +32,11 @@ use tiles::options::MaxError;
 /// The most points of a block. With fewer, more of them lie at its border; with more, fewer threads share the work, and caches hold less.
 const POINTS_PER_BLOCK: u64 = 1 << 17;
 
-/// Returns the most points of a block of a job of `points` points, which each thread has in memory and triangulates.
+/// Returns the most points of a block of a job of `points` points, which each thread has in memory and triangulates. `memory` is that of the selection.
 pub(crate) fn points_per_block(points: u64, memory: u64, threads: usize) -> u64 {
     let threads = threads as u64;
-    let fits = memory / threads / (BYTES_PER_LEAF_SITE + BYTES_PER_SELECTED);
+    // The other half is for what stays in memory.
+    let fits = memory / 2 / threads / BYTES_PER_POINT;
     (points / (4 * threads)).min(fits).clamp(1 << 12, POINTS_PER_BLOCK)
 }
 
@@ -85,19 +83,6 @@ fn fraction_of(bound: Decimal, step: Decimal) -> Option<ErrorBound> {
     }
 }
 
-/// Returns what is wrong if the memory has no room for so many selected points.
-pub(crate) fn too_many_vertices(options: &JobOptions, selected: u64) -> Option<String> {
-    let has_room = selected.saturating_mul(BYTES_PER_LISTED) <= working_memory(options) / 2;
-    (!has_room).then(|| {
-        format!(
-            "[output] max_error selects {} points or more, too many for [limits] memory = \"{}\"; fix: more [limits] memory, or a \
-             greater [output] max_error; without it, the mesh has all points",
-            grouped(selected),
-            options.limits.memory
-        )
-    })
-}
-
 /// Returns the lattice of a job in metres.
 pub(crate) fn metric_lattice(plan: &Plan) -> MetricLattice {
     let [horizontal, vertical] = plan.frame.resolution_metres();
@@ -129,6 +114,8 @@ pub(crate) struct PointsInBlocks<'a> {
     triangulator: &'a Triangulator,
     parts: &'a [PartInBlocks],
     blocks: Vec<(usize, TileIndex)>,
+    /// Where waits what the memory does not hold.
+    waiting: &'a SelectionFile,
     /// The ground, where only its points are wanted.
     ground: Option<Ground>,
     /// Triangles that flow by it may be slivers along the hull, unless they are on ground.
@@ -136,11 +123,16 @@ pub(crate) struct PointsInBlocks<'a> {
 }
 
 impl<'a> PointsInBlocks<'a> {
-    pub(crate) fn new(plan: &'a Plan, triangulator: &'a Triangulator, parts: &'a [PartInBlocks]) -> PointsInBlocks<'a> {
+    pub(crate) fn new(
+        plan: &'a Plan,
+        triangulator: &'a Triangulator,
+        parts: &'a [PartInBlocks],
+        waiting: &'a SelectionFile,
+    ) -> PointsInBlocks<'a> {
         let blocks =
             |(number, part): (usize, &'a PartInBlocks)| part.partition.tree.tiles().map(move |tile| (number, tile));
         let blocks = parts.iter().enumerate().flat_map(blocks).collect();
-        PointsInBlocks { plan, triangulator, parts, blocks, ground: None, rule: HullRule::of_lengths(plan) }
+        PointsInBlocks { plan, triangulator, parts, blocks, waiting, ground: None, rule: HullRule::of_lengths(plan) }
     }
 
     /// Leaves only the points on the ground, which it finds.
@@ -242,7 +234,7 @@ impl<'a> PointsInBlocks<'a> {
             let wanted = sites.len() as u64 + duplicates;
             let bounds = delaunay::geometry::Bounds::of_points(sites.iter().map(|site| site.position));
             if let Some((bounds, selected)) = bounds.zip(selected) {
-                leave_selected(&mut sites, selected.within(bounds));
+                leave_selected(&mut sites, selected.within(bounds)?);
             }
             BucketSorter::new(&grid, &buckets).add(&sites)?;
             Ok([wanted, duplicates])
@@ -282,22 +274,21 @@ impl PointSource for PointsInBlocks<'_> {
         Ok(self.triangulator.triangulate(sites)?.0)
     }
 
-    fn keeps_blocks(&self, points: u64, selected: u64) -> bool {
-        points * BYTES_PER_POINT + selected * (BYTES_PER_SELECTED + BYTES_PER_LISTED)
-            < working_memory(&self.plan.options)
+    fn memory(&self) -> u64 {
+        selection_memory(&self.plan.options)
+    }
+
+    fn store(&self) -> Option<&dyn SelectionStore> {
+        Some(self.waiting)
     }
 
     fn asks_about(&self, corners: [Site; 3]) -> bool {
         self.rule.flow(corners).is_some()
     }
 
-    fn after_round(&self, _: u32, selected: u64) -> Result<()> {
+    fn after_round(&self, _: u32, _: u64) -> Result<()> {
         fault::point("select");
-        interrupt::check()?;
-        match too_many_vertices(&self.plan.options, selected) {
-            Some(why) => Err(sys::Error::Config(why).into()),
-            None => Ok(()),
-        }
+        Ok(interrupt::check()?)
     }
 }
 

@@ -35,6 +35,11 @@ pub fn working_memory(options: &JobOptions) -> u64 {
     options.limits.memory.0 / 4 * 3
 }
 
+/// Returns the bytes that a selection may use. Blocks come and go and grow, and the allocator keeps a part of what they leave.
+pub(crate) fn selection_memory(options: &JobOptions) -> u64 {
+    working_memory(options) / 2
+}
+
 /// Returns the bytes that the merge at one node may use.
 ///
 /// Nodes below the root may be merged on all threads at the same time. During the merge at the root the other threads may write

@@ -3,7 +3,6 @@
 use crate::durable::directory::JobDirectory;
 use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::machine;
-use crate::mesh::selection::too_many_vertices;
 use crate::options::JobOptions;
 use crate::plan::budget::workers;
 use crate::plan::job_plan::{Plan, SkippedInput};
@@ -158,7 +157,6 @@ pub fn inspect(options: &JobOptions) -> crate::Result<(Preflight, Plan)> {
     if let MaxError::Units(units) = plan.options.output.max_error {
         let vertices = estimated_vertices(&plan, preflight.kept, &[units])?.first().copied();
         preflight.vertices = vertices;
-        preflight.warnings.extend(vertices.and_then(|vertices| too_many_vertices(options, vertices)));
         preflight.tiles = vertices.map_or(preflight.tiles, |vertices| estimate::tiles(&plan, KeptPoints(vertices)));
         preflight.exports = exports(options, vertices.unwrap_or(preflight.kept));
         preflight.terrain = estimate::terrain(vertices.unwrap_or(preflight.kept), &options.output);

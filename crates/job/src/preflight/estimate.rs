@@ -5,7 +5,7 @@ use crate::levels::hierarchy::{BYTES_PER_LEVEL_VERTEX, LevelSizes};
 use crate::machine;
 use crate::options::JobOptions;
 use crate::partition::tree_builder::buffer_bytes;
-use crate::plan::budget::{BYTES_PER_LEAF_SITE, network_memory, read_buffer_memory};
+use crate::plan::budget::{BYTES_PER_LEAF_SITE, network_memory, read_buffer_memory, selection_memory};
 use crate::plan::job_plan::{Plan, PlannedInput};
 use crate::preflight::contour_estimate::ContourEstimate;
 use crate::preflight::kept_points::{KeptPoints, has_filter};
@@ -19,11 +19,12 @@ use crate::publish::terrain_tiles::write_terrain::terrain_memory;
 use crate::tiles::vertex_colors::photo_memory;
 use delaunay::geometry::Bounds;
 use points::is_url;
+use selection::SWAPPED;
 use std::path::{Path, PathBuf};
 use tiles::Compression;
 use tiles::attributes::AttributeChoice;
 use tiles::color::HeightRange;
-use tiles::options::{ExportFormat, MaxEdge, OutputFormat, OutputOptions};
+use tiles::options::{ExportFormat, MaxEdge, MaxError, OutputFormat, OutputOptions};
 use tiles::preview::canvas::{Canvas, PreviewPixel, longer_side};
 use tiles::raster::options::RasterCompression;
 use tiles::raster::products::RasterProduct;
@@ -113,8 +114,23 @@ impl DiskEstimate {
         let most = if keeps_leaves { store } else { border + waiting_leaves(plan, points, leaves, tiles) };
         // The points of a part stay until it is meshed; those of all others are gone by the last.
         let of_last = point_file / points.max(1) * points.min(plan.points_per_part());
-        let temporary = point_file.max(most + of_last.max(beside));
-        DiskEstimate { temporary, results, least: point_file.max(most + results + of_last.max(beside)) }
+        let in_selection = point_file + selection_bytes(points, options);
+        let temporary = in_selection.max(most + of_last.max(beside));
+        DiskEstimate { temporary, results, least: in_selection.max(most + results + of_last.max(beside)) }
+    }
+}
+
+/// Returns the most bytes that a selection from so many points has in its file.
+fn selection_bytes(points: u64, options: &JobOptions) -> u64 {
+    // Blocks are at their places, with room to grow, and so is the list of selected points.
+    const PER_POINT: u64 = 100;
+    const PER_SELECTED: u64 = 12;
+    const PER_POINT_IN_MEMORY: u64 = 330;
+    let fits = points * PER_POINT_IN_MEMORY <= selection_memory(options);
+    if options.output.max_error == MaxError::None || fits {
+        0
+    } else {
+        (points * PER_POINT).min(SWAPPED) + points * PER_SELECTED
     }
 }
 

@@ -7,7 +7,7 @@ use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::triangulation::canonical;
 use rayon::prelude::*;
-use selection::{BlockPoints, ErrorBound, PointSource, Selection, select};
+use selection::{BlockPoints, ErrorBound, PointSource, Selection, SelectionStore, select};
 use sys::{Error, Result, interrupt};
 
 /// Returns about how many of `kept` points each of the `bounds`, in source units of height, selects. Where files are sorted otherwise than by
@@ -28,8 +28,7 @@ pub fn estimated_vertices(plan: &Plan, kept: u64, bounds: &[f64]) -> Result<Vec<
 
 /// Returns how many of some points are selected.
 fn selected_of(points: &[[i32; 3]], bound: ErrorBound) -> Result<u64> {
-    let Selection { figures, .. } = select(&Sample(points), bound)?;
-    Ok(figures.selected)
+    Ok(select(&Sample(points), bound)?.figures.selected)
 }
 
 /// Returns those of some points that are selected.
@@ -38,8 +37,9 @@ fn selected_of(points: &[[i32; 3]], bound: ErrorBound) -> Result<u64> {
 /// [`Error::Interrupted`].
 pub(crate) fn selected_points(points: &[[i32; 3]], bound: ErrorBound) -> Result<Vec<[i32; 3]>> {
     let Some(bounds) = Bounds::of_points(points.iter().map(|[x, y, _]| [*x, *y])) else { return Ok(Vec::new()) };
-    let Selection { sites, .. } = select(&Sample(points), bound)?;
-    let mut selected = sites.within(bounds);
+    let sample = Sample(points);
+    let Selection { sites, .. } = select(&sample, bound)?;
+    let mut selected = sites.within(bounds)?;
     selected.sort_unstable();
     Ok(selected)
 }
@@ -66,8 +66,12 @@ impl PointSource for Sample<'_> {
         canonical(sites).map_err(|error| Error::Broken(error.to_string()))
     }
 
-    fn keeps_blocks(&self, _: u64, _: u64) -> bool {
-        true
+    fn memory(&self) -> u64 {
+        u64::MAX
+    }
+
+    fn store(&self) -> Option<&dyn SelectionStore> {
+        None
     }
 
     fn asks_about(&self, _: [Site; 3]) -> bool {

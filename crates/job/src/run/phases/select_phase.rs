@@ -6,8 +6,9 @@ use crate::index::PartIndex;
 use crate::mesh::ground_record::{load_ground, save_ground};
 use crate::mesh::hull_rule::HullRule;
 use crate::mesh::selection::{PartInBlocks, PointsInBlocks, WrittenPoints, error_bound, points_per_block};
+use crate::mesh::selection_file::SelectionFile;
 use crate::partition::part_points::{PointsOfPart, file_of_selected};
-use crate::plan::budget::working_memory;
+use crate::plan::budget::selection_memory;
 use crate::plan::job_plan::Plan;
 use crate::records::{JobStep, StepRecord, Store};
 use crate::run::folder::{Folder, done_with};
@@ -58,7 +59,7 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     // The lock of the first part is that of the phase: no other phase goes on before this one is done.
     let first = Folder::open(job, PartIndex::FIRST, key)?;
     let stage = job.progress.stage("select", job.plan.decoded_records(), "points");
-    let memory = working_memory(&job.plan.options);
+    let memory = selection_memory(&job.plan.options);
     let per_block = points_per_block(job.plan.decoded_records(), memory, job.threads);
     let in_blocks = |part: PartIndex| {
         let directory = job.folder(part);
@@ -68,7 +69,8 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
         Ok(PartInBlocks { part, partition, files })
     };
     let parts = job.parts.all().map(in_blocks).collect::<Result<Vec<PartInBlocks>>>()?;
-    let mut source = PointsInBlocks::new(job.plan, job.triangulator, &parts);
+    let waiting = SelectionFile::at(&first.directory)?;
+    let mut source = PointsInBlocks::new(job.plan, job.triangulator, &parts, &waiting);
     if job.plan.options.input.finds_ground() {
         source = source.on_found_ground(|points| stage.advance(points))?;
     }
@@ -103,7 +105,7 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
         folder.record(JobStep::Select, selected, stages)?;
     }
     job.plan.on_ground.set(on_ground);
-    Ok(())
+    Ok(waiting.discard()?)
 }
 
 /// Returns the key of the selection, with `--update`: the digest of the points of all parts, and which triangles are asked about. Else 0.

@@ -1,0 +1,58 @@
+//! What blocks take of the memory, and which of them may stay there from round to round. That changes how often they are read, and nothing else.
+
+use crate::source::{BYTES_PER_LOADED, BYTES_PER_TRIANGULATED, BYTES_PER_WAITING};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The memory of a selection.
+#[derive(Debug)]
+pub(crate) struct BlockMemory {
+    /// The bytes that all blocks together may take.
+    limit: u64,
+    /// Those that blocks take which stay.
+    kept: AtomicU64,
+    /// The most that a thread has taken with a block.
+    most_of_thread: AtomicU64,
+}
+
+impl BlockMemory {
+    pub(crate) fn new(limit: u64) -> BlockMemory {
+        BlockMemory { limit, kept: AtomicU64::new(0), most_of_thread: AtomicU64::new(0) }
+    }
+
+    /// Tells whether the points of a block stay, of which it has so many.
+    pub(crate) fn keeps_points(&self, points: u64) -> bool {
+        self.note_thread(points * BYTES_PER_LOADED);
+        self.keeps(points * BYTES_PER_WAITING, 0)
+    }
+
+    /// The points of a block are taken.
+    pub(crate) fn take_points(&self, points: u64) {
+        self.release(points * BYTES_PER_WAITING);
+    }
+
+    /// Tells whether a block of `points` points stays whose triangulation has `sites` sites, and which takes so many `bytes`. All that is selected
+    /// takes `selected` bytes.
+    pub(crate) fn keeps_block(&self, points: u64, sites: u64, bytes: u64, selected: u64) -> bool {
+        self.note_thread((points * BYTES_PER_LOADED).max(bytes + sites * BYTES_PER_TRIANGULATED));
+        self.keeps(bytes, selected)
+    }
+
+    /// A block that took so many bytes no longer does.
+    pub(crate) fn release(&self, bytes: u64) {
+        self.kept.fetch_sub(bytes, Ordering::Relaxed);
+    }
+
+    fn note_thread(&self, bytes: u64) {
+        self.most_of_thread.fetch_max(bytes, Ordering::Relaxed);
+    }
+
+    fn keeps(&self, bytes: u64, selected: u64) -> bool {
+        let of_threads = rayon::current_num_threads() as u64 * self.most_of_thread.load(Ordering::Relaxed);
+        let kept = self.kept.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        let stays = kept + of_threads + selected <= self.limit;
+        if !stays {
+            self.release(bytes);
+        }
+        stays
+    }
+}

@@ -1,0 +1,122 @@
+//! Blocks that the memory does not hold, in a file: to write a block and to read it again takes far less time than to make it anew.
+
+use crate::block::Block;
+use crate::source::SelectionStore;
+use bytemuck::{Pod, cast_slice, cast_slice_mut, zeroed_vec};
+use std::sync::atomic::{AtomicU64, Ordering};
+use sys::Result;
+
+/// The most bytes of a file that the places of blocks have.
+pub const SWAPPED: u64 = 2 << 30;
+
+/// How many bytes of a file the places of blocks have.
+#[derive(Debug, Default)]
+pub(crate) struct SwapSpace(AtomicU64);
+
+/// A place for so many bytes in a file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    at: u64,
+    bytes: u64,
+}
+
+impl SwapSpace {
+    /// Returns a place for so many bytes: that of `before`, if it is large enough. `None` if there is no space left.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`].
+    pub(crate) fn place(&self, bytes: u64, before: Option<Place>, store: &dyn SelectionStore) -> Result<Option<Place>> {
+        if let Some(place) = before {
+            if bytes <= place.bytes {
+                return Ok(before);
+            }
+            self.free(place, store)?;
+        }
+        // Blocks grow.
+        let bytes = bytes + bytes / 2;
+        if self.0.fetch_add(bytes, Ordering::Relaxed) + bytes > SWAPPED {
+            self.0.fetch_sub(bytes, Ordering::Relaxed);
+            return Ok(None);
+        }
+        Ok(Some(Place { at: store.reserve(bytes), bytes }))
+    }
+
+    /// Gives the space of a place back.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`].
+    pub(crate) fn free(&self, Place { at, bytes }: Place, store: &dyn SelectionStore) -> Result<()> {
+        self.0.fetch_sub(bytes, Ordering::Relaxed);
+        store.free(at, bytes)
+    }
+}
+
+/// A block whose columns are in a file.
+pub(crate) struct SwappedBlock {
+    /// The block with empty columns.
+    block: Block,
+    lengths: Vec<usize>,
+    place: Place,
+}
+
+impl SwappedBlock {
+    /// Writes a block to a place that is large enough.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`].
+    pub(crate) fn write(mut block: Block, place: Place, store: &dyn SelectionStore) -> Result<SwappedBlock> {
+        let columns = block.columns();
+        let lengths = columns.iter().map(|column| column.length()).collect();
+        let mut at = place.at;
+        for column in columns {
+            store.write(at, column.bytes())?;
+            at += column.bytes().len() as u64;
+            column.clear();
+        }
+        Ok(SwappedBlock { block, lengths, place })
+    }
+
+    /// Reads the block.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`].
+    pub(crate) fn read(self, store: &dyn SelectionStore) -> Result<Block> {
+        let SwappedBlock { mut block, lengths, place } = self;
+        let mut at = place.at;
+        for (column, length) in block.columns().into_iter().zip(lengths) {
+            let bytes = column.filled(length);
+            store.read(at, bytes)?;
+            at += bytes.len() as u64;
+        }
+        Ok(block)
+    }
+}
+
+/// A list of numbers.
+pub(crate) trait Column {
+    fn length(&self) -> usize;
+    fn bytes(&self) -> &[u8];
+    /// Gives the memory back.
+    fn clear(&mut self);
+    /// Makes the column as long as this, and returns its bytes.
+    fn filled(&mut self, length: usize) -> &mut [u8];
+}
+
+impl<T: Pod> Column for Vec<T> {
+    fn length(&self) -> usize {
+        self.len()
+    }
+
+    fn bytes(&self) -> &[u8] {
+        cast_slice(self)
+    }
+
+    fn clear(&mut self) {
+        *self = Vec::new();
+    }
+
+    fn filled(&mut self, length: usize) -> &mut [u8] {
+        *self = zeroed_vec(length);
+        cast_slice_mut(self)
+    }
+}
