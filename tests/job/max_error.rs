@@ -84,6 +84,20 @@ fn the_mesh_is_the_same_however_the_job_is_done() {
 }
 
 #[test]
+fn what_the_memory_does_not_hold_waits_in_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = [clouds::write(folder.path(), "hills.csv", &hills(300_000, 3))];
+    let facts = |memory: &str| {
+        let job = within(Job::on(&file).with("limits", &format!("memory = \"{memory}\"")), "0.1");
+        let report = job.report();
+        (job.digest(), report["selection"].clone(), number(&report["bytes_temporary"]))
+    };
+    let (ample, scarce) = (facts("2 GiB"), facts("128 MiB"));
+    assert_eq!((&ample.0, &ample.1), (&scarce.0, &scarce.1));
+    assert!(scarce.2 > ample.2 + (4 << 20), "{scarce:?} {ample:?}");
+}
+
+#[test]
 fn breaklines_stay_edges_and_lakes_stay_flat() {
     let survey = Survey::new(6_000);
     let job = within(survey.job().tiles_of(700), "1.5");

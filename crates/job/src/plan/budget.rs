@@ -35,9 +35,12 @@ pub fn working_memory(options: &JobOptions) -> u64 {
     options.limits.memory.0 / 4 * 3
 }
 
-/// Returns the bytes that a selection may use. Blocks come and go and grow, and the allocator keeps a part of what they leave.
+/// Returns the bytes that a selection may use. Blocks come and go and grow, and the allocator keeps a part of what they leave: a third where
+/// they are few.
 pub(crate) fn selection_memory(options: &JobOptions) -> u64 {
-    working_memory(options) / 2
+    const KEPT: u64 = 64 << 20;
+    let quarter = working_memory(options) / 4;
+    3 * quarter - quarter.min(KEPT)
 }
 
 /// Returns the bytes that the merge at one node may use.
