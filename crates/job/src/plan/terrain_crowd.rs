@@ -15,10 +15,10 @@ use tiles::options::MaxEdge;
 use tiles::terrain_options::TerrainScheme;
 
 /// Bytes that a vertex takes, with its triangles, while its tile is joined from pieces: most of all where rounding has folded triangles.
-pub(crate) const BYTES_PER_VERTEX: u64 = 448;
+pub(crate) const BYTES_PER_VERTEX: u64 = 216;
 
 /// Bytes that a vertex of the tiles below one takes while that one is made.
-pub(crate) const BYTES_TO_SELECT: u64 = 160;
+pub(crate) const BYTES_TO_SELECT: u64 = 80;
 
 /// Bytes that the process has by then, and those that each thread takes besides its tile.
 const PROCESS: u64 = 72 << 20;
