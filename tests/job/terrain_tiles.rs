@@ -302,13 +302,13 @@ fn the_least_limit_that_check_lets_pass_suffices() {
     let folder = tempfile::tempdir().unwrap();
     let places = [[2_000, 2_000], [9_000, 2_000], [16_000, 2_000], [2_000, 14_000], [16_000, 14_000]];
     let cloud = clouds::write(folder.path(), "cloud.csv", &crowded(&places, 150_000));
-    let limits = (4..).map(|sixteens| 16 * sixteens);
+    let limits = (8..).map(|sixteens| 16 * sixteens);
     let passes = |limit: &u64| {
         let said = crowded_job(&cloud, &format!("{limit} MiB")).run_with(&["check"]);
         said.code == 0
     };
     let least = limits.take(40).find(passes).unwrap();
-    assert!((96..=224).contains(&least), "{least} MiB");
+    assert!((128..=224).contains(&least), "{least} MiB");
     stays_within(&crowded_job(&cloud, &format!("{least} MiB")).threads(2).report(), least);
 }
 
