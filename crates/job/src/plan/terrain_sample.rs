@@ -11,8 +11,8 @@ use tiles::frame::Frame;
 /// A tile where fewer places of the sample have points tells little: all points of the places may be in it, or only those of the sample.
 const SURE_PLACES: usize = 4;
 
-/// A tile where fewer have points tells nothing.
-const LEAST_PLACES: usize = 2;
+/// A tile where fewer have points tells nothing: files of flight lines have such tiles by chance.
+const LEAST_PLACES: usize = 3;
 
 /// A sample that reaches along so much of both sides of the box around all points shows the hull of the terrain, and the area of that may be so many times
 /// what it shows.
