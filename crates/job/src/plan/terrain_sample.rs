@@ -239,7 +239,8 @@ mod tests {
         for places in [2_000, 40_000, 100_000, 250_000] {
             let drawn = (0..60_000).map(|i| ([next(places) as i64, 0], i / 500)).collect();
             let (found, expected) = (vertices(drawn, 25.0), places as f64);
-            assert!((0.9 * expected..1.15 * expected).contains(&found), "{places}: {found}");
+            // At most what chance may have hidden.
+            assert!((0.95 * expected..1.25 * expected).contains(&found), "{places}: {found}");
         }
     }
 
@@ -266,8 +267,8 @@ mod tests {
     #[test]
     fn the_most_crowded_tile_is_found() {
         // A tile of zoom 12 is 0.044 degrees wide.
-        let wide = (0..500).map(|i| [0.1 + i as f64 * 1e-3, 0.7]);
-        let crowd = (500..4_500).map(|i| [0.2, 0.8].map(|angle: f64| angle + (i * i % 4_001) as f64 * 1e-7));
+        let wide = (0..500).map(|i| [0.1 + f64::from(i) * 1e-3, 0.7]);
+        let crowd = (0..4_000).map(|i| [0.2 + f64::from(i % 64) * 1e-7, 0.8 + f64::from(i / 64) * 1e-7]);
         let of_place = |of_place: usize| {
             let sites = wide.clone().chain(crowd.clone()).enumerate();
             let sites = sites.map(|(i, place)| PlacedSite { number: i / of_place, site: [i as i32, 7], place });
