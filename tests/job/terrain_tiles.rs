@@ -228,6 +228,27 @@ fn a_terrain_partly_beyond_web_mercator_is_refused_before_it_is_read() {
     job("geographic", "").run_with(&["check"]).succeeded();
 }
 
+/// The boxes of files show it, or a sample of the points where these are cut.
+#[test]
+fn a_terrain_around_too_much_of_the_globe_is_refused_before_it_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    // 96 degrees of longitude, and 48 of latitude.
+    let wide: clouds::Cloud = hills(900, 5).into_iter().map(|[x, y, z]| [x * 530 - 5_300_000, y * 265, z]).collect();
+    let cloud = clouds::write(folder.path(), "cloud.csv", &wide);
+    let job = |bounds: &str| {
+        let job = Job::on(&[&cloud]).with("input", &format!("crs = \"EPSG:3395\"\n{bounds}"));
+        job.with("output", TERRAIN)
+    };
+    let told = ["degrees of longitude; 90 degrees is the limit", "fix: smaller [input] bounds"];
+    for bounds in ["", "bounds = [-5350000.0, 0.0, 5350000.0, 5000000.0]"] {
+        job(bounds).run_with(&["check"]).refused(2, &told);
+        let refused = job(bounds);
+        refused.run().refused(2, &told);
+        assert!(!refused.out().join("tiles").exists());
+    }
+    job("bounds = [-4000000.0, 0.0, 4000000.0, 5000000.0]").run_with(&["check"]).succeeded();
+}
+
 /// Returns a sparse terrain of 20 km with places that have so many points each, on 900 m.
 fn crowded(places: &[[i64; 2]], points: usize) -> clouds::Cloud {
     let mut random = Random(11);
@@ -262,7 +283,7 @@ fn stays_within(report: &Value, mebibytes: u64) {
 fn a_tile_without_room_is_refused_at_once_and_the_limit_that_is_named_suffices() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = clouds::write(folder.path(), "cloud.csv", &crowded(&[[9_000, 9_000]], 600_000));
-    let told = ["[output.terrain] takes at least", "for one terrain tile", "fix: [limits] memory = \""];
+    let told = ["[output.terrain] takes up to about", "for one terrain tile", "fix: [limits] memory = \""];
     crowded_job(&cloud, "128 MiB").run_with(&["check"]).refused(2, &told);
     let said = crowded_job(&cloud, "128 MiB").run();
     said.refused(2, &told);
@@ -273,6 +294,22 @@ fn a_tile_without_room_is_refused_at_once_and_the_limit_that_is_named_suffices()
     // The tile takes more than a thread's share of that, and has room alone.
     gdt_batch(job.folder(), &["verify", "out", "--memory", "128 MiB"]).succeeded();
     job.verified();
+}
+
+/// What `check` lets pass does not stop when the mesh is done, and a limit is not refused that would have been enough by far.
+#[test]
+fn the_least_limit_that_check_lets_pass_suffices() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [[2_000, 2_000], [9_000, 2_000], [16_000, 2_000], [2_000, 14_000], [16_000, 14_000]];
+    let cloud = clouds::write(folder.path(), "cloud.csv", &crowded(&places, 150_000));
+    let limits = (8..).map(|sixteens| 16 * sixteens);
+    let passes = |limit: &u64| {
+        let said = crowded_job(&cloud, &format!("{limit} MiB")).run_with(&["check"]);
+        said.code == 0
+    };
+    let least = limits.take(40).find(passes).unwrap();
+    assert!((128..=224).contains(&least), "{least} MiB");
+    stays_within(&crowded_job(&cloud, &format!("{least} MiB")).threads(2).report(), least);
 }
 
 /// Without a budget for all threads, four of them would join four great tiles at the same time.

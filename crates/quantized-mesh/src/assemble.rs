@@ -2,26 +2,23 @@
 
 use crate::cut::Piece;
 use crate::fill::{fill, planar, within_border};
-use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, double_area, in_order};
-use crate::number_hash::NumberMap;
+use crate::groups::Groups;
+use crate::mesh::{LAST, Node, OUTSIDE, TileMesh, corner_place, double_area, each_once, in_order};
 use crate::unfold::unfolded;
+use std::cmp::Ordering;
 
 /// Twice the area of a tile in square steps.
 const WHOLE: i64 = 2 * (LAST as i64) * (LAST as i64);
 
 /// Joins what the terrain has in a tile, and fills the rest of it. Of vertices that share a place the highest stays. `None` if the terrain does not
 /// reach the tile.
-pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
+pub fn assemble(pieces: Vec<Piece>) -> Option<TileMesh> {
     let mut corners = [None; 4];
-    for piece in pieces {
+    for piece in &pieces {
         corners.iter_mut().zip(piece.corners).for_each(|(known, more)| *known = (*known).max(more));
     }
-    let (nodes, numbers) = joined_nodes(pieces, corners);
-    let (mut all, mut first) = (Vec::new(), 0);
-    for piece in pieces {
-        all.extend(piece.triangles.iter().map(|triangle| triangle.map(|v| numbers[first + v as usize])));
-        first += piece.nodes.len();
-    }
+    let (nodes, numbers) = joined_nodes(&pieces, corners);
+    let all = joined_triangles(pieces, numbers);
     let area_of = |triangle: &[u32; 3]| double_area(triangle.map(|v| nodes[v as usize]));
     // Triangles that rounding has turned over have negative areas, so that the sum is that of the terrain.
     let areas = all.iter().map(area_of);
@@ -33,16 +30,16 @@ pub fn assemble(pieces: &[Piece]) -> Option<TileMesh> {
             return None;
         }
         let triangles = within_border(&nodes);
-        return Some(without_unused(nodes, &triangles));
+        return Some(without_unused(nodes, triangles));
     }
     if !is_unfolded || !has_all_on_border(&nodes, &kept) {
-        kept = planar(&nodes, &kept);
+        kept = planar(&nodes, kept);
     } else if area != WHOLE {
-        let around = ends(&kept);
+        let around = ends(nodes.len(), &kept);
         let inner: Vec<[u32; 2]> = around.iter().copied().filter(|edge| !is_on_side(&nodes, *edge)).collect();
         kept.extend(fill(&nodes, &inner, &around));
     }
-    Some(without_unused(nodes, &kept))
+    Some(without_unused(nodes, kept))
 }
 
 /// Returns the vertices of all pieces in order, each place once, and the four corners. Returns the number of each vertex of the pieces among
@@ -53,22 +50,9 @@ fn joined_nodes(pieces: &[Piece], corners: [Option<i32>; 4]) -> (Vec<Node>, Vec<
         let [u, v] = corner_place(corner);
         Node { u, v, h: OUTSIDE }
     });
-    let all: Vec<Node> = of_pieces.chain(of_corners).collect();
-    let mut order: Vec<u64> = (0..).zip(&all).map(|(i, node)| u64::from(node.order()) << 32 | i).collect();
-    order.sort_unstable();
-    let (mut nodes, mut numbers): (Vec<Node>, Vec<u32>) = (Vec::new(), vec![0; all.len()]);
-    let mut last = None;
-    for key in order {
-        let (place, i) = (key >> 32, (key & u64::from(u32::MAX)) as usize);
-        if last != Some(place) {
-            nodes.push(all[i]);
-            last = Some(place);
-        }
-        numbers[i] = (nodes.len() - 1) as u32;
-        if let Some(node) = nodes.last_mut() {
-            node.h = node.h.max(all[i].h);
-        }
-    }
+    let mut all: Vec<Node> = Vec::with_capacity(pieces.iter().map(|piece| piece.nodes.len()).sum::<usize>() + 4);
+    all.extend(of_pieces.chain(of_corners));
+    let (mut nodes, numbers) = each_once(&all);
     for node in &mut nodes {
         // A crossing may round to a corner that the terrain does not cover: the tiles around it would not know that.
         if let Some(corner) = node.corner() {
@@ -76,6 +60,17 @@ fn joined_nodes(pieces: &[Piece], corners: [Option<i32>; 4]) -> (Vec<Node>, Vec<
         }
     }
     (nodes, numbers)
+}
+
+/// Returns the triangles of all pieces, whose vertices have these numbers one after the other. Pieces are dropped on the way.
+fn joined_triangles(pieces: Vec<Piece>, numbers: Vec<u32>) -> Vec<[u32; 3]> {
+    let mut all = Vec::with_capacity(pieces.iter().map(|piece| piece.triangles.len()).sum());
+    let mut first = 0;
+    for piece in pieces {
+        all.extend(piece.triangles.iter().map(|triangle| triangle.map(|v| numbers[first + v as usize])));
+        first += piece.nodes.len();
+    }
+    all
 }
 
 /// Tells whether triangles have all vertices on the border of the tile but its corners.
@@ -86,18 +81,21 @@ fn has_all_on_border(nodes: &[Node], triangles: &[[u32; 3]]) -> bool {
 }
 
 /// Returns the edges that only one of the triangles has, or more on one side than on the other, in order and with the triangles on their left.
-fn ends(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut counts: NumberMap<[u32; 2], i32> = NumberMap::default();
-    for &[a, b, c] in triangles {
-        for [from, to] in [[a, b], [b, c], [c, a]] {
-            match from < to {
-                true => *counts.entry([from, to]).or_default() += 1,
-                false => *counts.entry([to, from]).or_default() -= 1,
+fn ends(vertices: usize, triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(|[from, to]| from != to);
+    // By the lesser vertex: the other one, and whether the edge begins there.
+    let of_least = Groups::new(vertices, edges.map(|[from, to]| (from.min(to), [from.max(to), u32::from(from > to)])));
+    let mut ends = Vec::new();
+    for (least, group) in of_least.all() {
+        for same in group.chunk_by(|a, b| a[0] == b[0]) {
+            let back = same.iter().filter(|[_, is_back]| *is_back == 1).count();
+            match (same.len() - back).cmp(&back) {
+                Ordering::Greater => ends.push([least, same[0][0]]),
+                Ordering::Less => ends.push([same[0][0], least]),
+                Ordering::Equal => {}
             }
         }
     }
-    let ends = counts.into_iter().filter(|([a, b], count)| a != b && *count != 0);
-    let mut ends: Vec<[u32; 2]> = ends.map(|([a, b], count)| if count > 0 { [a, b] } else { [b, a] }).collect();
     ends.sort_unstable();
     ends
 }
@@ -110,7 +108,7 @@ fn is_on_side(nodes: &[Node], edge: [u32; 2]) -> bool {
 }
 
 /// Returns the mesh of these triangles, without the vertices that none of them has.
-pub(crate) fn without_unused(nodes: Vec<Node>, triangles: &[[u32; 3]]) -> TileMesh {
+pub(crate) fn without_unused(nodes: Vec<Node>, mut triangles: Vec<[u32; 3]>) -> TileMesh {
     let mut is_used = vec![false; nodes.len()];
     triangles.iter().flatten().for_each(|&v| is_used[v as usize] = true);
     if is_used.iter().all(|used| *used) {
@@ -126,7 +124,7 @@ pub(crate) fn without_unused(nodes: Vec<Node>, triangles: &[[u32; 3]]) -> TileMe
         })
         .collect();
     let nodes: Vec<Node> = nodes.into_iter().zip(&is_used).filter(|(_, used)| **used).map(|(node, _)| node).collect();
-    let triangles: Vec<[u32; 3]> = triangles.iter().map(|triangle| triangle.map(|v| numbers[v as usize])).collect();
-    let triangles = in_order(nodes.len(), &triangles);
+    triangles.iter_mut().flatten().for_each(|v| *v = numbers[*v as usize]);
+    let triangles = in_order(nodes.len(), triangles);
     TileMesh { nodes, triangles }
 }

@@ -268,7 +268,7 @@ impl TileSource<'_> {
             let is_outside = |node: &&mut Node| outside.binary_search(&node.order()).is_ok();
             nodes.iter_mut().filter(is_outside).for_each(|node| node.h = OUTSIDE);
         }
-        let triangles = in_order(nodes.len(), &triangles);
+        let triangles = in_order(nodes.len(), triangles);
         TileMesh { nodes, triangles }
     }
 

@@ -4,9 +4,12 @@
 //! computed from them when the polygon is complete. So no rounding enters a decision, and both tiles beside a border round the same
 //! fractions.
 
-use crate::mesh::{LAST, Node};
+use crate::mesh::{LAST, Node, each_once};
 use crate::number_hash::NumberMap;
 use crate::place::{GridPoint, SPAN};
+
+/// If one of so many triangles has two corners in one place, it is worth while to look for others.
+const FLAT_SHARE: usize = 8;
 
 /// What a set of triangles leaves in a tile.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -44,7 +47,23 @@ pub fn cut(points: &[GridPoint], triangles: &[[u32; 3]]) -> Vec<([i32; 2], Piece
     }
     own.resize_with(cutter.pieces.len(), Vec::new);
     add_inner(points, &own, &mut cutter.pieces);
+    cutter.pieces.iter_mut().for_each(|(_, piece)| piece.join_places());
     cutter.pieces
+}
+
+impl Piece {
+    /// Makes one vertex of all in a place, the highest, if many are where others are: they would wait for nothing.
+    fn join_places(&mut self) {
+        let place = |v: u32| [self.nodes[v as usize].u, self.nodes[v as usize].v];
+        let is_flat = |[a, b, c]: &[u32; 3]| place(*a) == place(*b) || place(*b) == place(*c) || place(*c) == place(*a);
+        if self.triangles.iter().filter(|triangle| is_flat(triangle)).count() * FLAT_SHARE <= self.triangles.len() {
+            return;
+        }
+        self.triangles.retain(|triangle| !is_flat(triangle));
+        let (nodes, numbers) = each_once(&self.nodes);
+        self.triangles.iter_mut().flatten().for_each(|v| *v = numbers[*v as usize]);
+        self.nodes = nodes;
+    }
 }
 
 /// Adds the triangles that lie within one tile to their pieces. `own` are their corners by piece.

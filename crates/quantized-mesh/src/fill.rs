@@ -1,13 +1,13 @@
 //! Triangles between the edge of the terrain and the border of its tile.
 
+use crate::groups::Groups;
 use crate::mesh::Node;
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
-use std::collections::BTreeMap;
 
 /// A vertex with its number.
 struct Vertex {
-    place: Point2<f64>,
+    place: [u16; 2],
     number: u32,
 }
 
@@ -15,7 +15,8 @@ impl HasPosition for Vertex {
     type Scalar = f64;
 
     fn position(&self) -> Point2<f64> {
-        self.place
+        let [x, y] = self.place.map(f64::from);
+        Point2::new(x, y)
     }
 }
 
@@ -24,40 +25,43 @@ impl HasPosition for Vertex {
 pub(crate) fn fill(nodes: &[Node], inner: &[[u32; 2]], around: &[[u32; 2]]) -> Vec<[u32; 3]> {
     let corners = (0..).zip(nodes).filter(|(_, node)| node.corner().is_some()).map(|(v, _)| v);
     let vertices = corners.chain(inner.iter().flatten().copied());
-    let mut faces = faces(nodes, vertices, inner);
+    let mut faces = faces(nodes, vertices, inner.iter().copied());
     faces.retain(|face| !is_terrain(nodes, *face, around));
     faces
 }
 
 /// Returns triangles between all vertices on the border of a tile.
 pub(crate) fn within_border(nodes: &[Node]) -> Vec<[u32; 3]> {
-    faces(nodes, (0..).zip(nodes).filter(|(_, node)| node.is_on_border()).map(|(v, _)| v), &[])
+    faces(nodes, (0..).zip(nodes).filter(|(_, node)| node.is_on_border()).map(|(v, _)| v), [])
 }
 
 /// Returns triangles between all vertices of a tile that have as many as possible of the edges of `triangles`.
-pub(crate) fn planar(nodes: &[Node], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+pub(crate) fn planar(nodes: &[Node], triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-    let mut edges: Vec<[u32; 2]> = edges.map(|[a, b]| [a.min(b), a.max(b)]).collect();
-    edges.sort_unstable();
-    edges.dedup();
-    faces(nodes, 0..nodes.len() as u32, &edges)
+    let of_least = Groups::new(nodes.len(), edges.map(|[a, b]| (a.min(b), a.max(b))));
+    drop(triangles);
+    let edges = of_least.all().flat_map(|(v, others)| others.chunk_by(|a, b| a == b).map(move |same| [v, same[0]]));
+    faces(nodes, 0..nodes.len() as u32, edges)
 }
 
 /// Returns the constrained Delaunay triangulation of some vertices. Rounding may let two of the edges cross: the first is one of it then.
-fn faces(nodes: &[Node], vertices: impl Iterator<Item = u32>, edges: &[[u32; 2]]) -> Vec<[u32; 3]> {
-    let mut plane = ConstrainedDelaunayTriangulation::<Vertex>::new();
-    let mut handles: BTreeMap<u32, FixedVertexHandle> = BTreeMap::new();
+fn faces(
+    nodes: &[Node],
+    vertices: impl Iterator<Item = u32> + Clone,
+    edges: impl IntoIterator<Item = [u32; 2]>,
+) -> Vec<[u32; 3]> {
+    let count = vertices.clone().count();
+    let mut plane = ConstrainedDelaunayTriangulation::<Vertex>::with_capacity(count, 3 * count, 2 * count);
+    let mut handles: Vec<Option<FixedVertexHandle>> = vec![None; nodes.len()];
     for v in vertices {
-        let place = nodes[v as usize];
-        let vertex = Vertex { place: Point2::new(f64::from(place.u), f64::from(place.v)), number: v };
-        if !handles.contains_key(&v)
-            && let Ok(handle) = plane.insert(vertex)
-        {
-            handles.insert(v, handle);
+        let Node { u, v: north, .. } = nodes[v as usize];
+        let handle = &mut handles[v as usize];
+        if handle.is_none() {
+            *handle = plane.insert(Vertex { place: [u, north], number: v }).ok();
         }
     }
     for edge in edges {
-        if let [Some(&from), Some(&to)] = edge.map(|v| handles.get(&v))
+        if let [Some(from), Some(to)] = edge.map(|v| handles[v as usize])
             && plane.can_add_constraint(from, to)
         {
             plane.add_constraint(from, to);

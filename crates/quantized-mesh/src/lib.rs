@@ -17,6 +17,7 @@ mod cut;
 mod decode;
 mod encode;
 mod fill;
+mod groups;
 mod halves;
 mod header;
 mod layer;

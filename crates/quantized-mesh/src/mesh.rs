@@ -103,10 +103,24 @@ pub(crate) fn least_first([a, b, c]: [u32; 3]) -> [u32; 3] {
     }
 }
 
+/// Returns the places of vertices in order, each once and with its highest vertex, and the number of the place of each vertex.
+pub(crate) fn each_once(all: &[Node]) -> (Vec<Node>, Vec<u32>) {
+    let mut order: Vec<u64> = (0..).zip(all).map(|(i, node)| u64::from(node.order()) << 32 | i).collect();
+    order.sort_unstable();
+    let count = order.chunk_by(|a, b| a >> 32 == b >> 32).count();
+    let (mut nodes, mut numbers): (Vec<Node>, Vec<u32>) = (Vec::with_capacity(count), vec![0; all.len()]);
+    for of_place in order.chunk_by(|a, b| a >> 32 == b >> 32) {
+        let vertices = || of_place.iter().map(|key| (key & u64::from(u32::MAX)) as usize);
+        vertices().for_each(|i| numbers[i] = nodes.len() as u32);
+        nodes.extend(vertices().map(|i| all[i]).max_by_key(|node| node.h));
+    }
+    (nodes, numbers)
+}
+
 /// Puts triangles into the order of a mesh of so many vertices.
-pub(crate) fn in_order(vertices: usize, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+pub(crate) fn in_order(vertices: usize, triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     let mut starts = vec![0u32; vertices + 1];
-    let turned: Vec<[u32; 3]> = triangles.iter().map(|&triangle| least_first(triangle)).collect();
+    let turned: Vec<[u32; 3]> = triangles.into_iter().map(least_first).collect();
     turned.iter().for_each(|triangle| starts[triangle[0] as usize + 1] += 1);
     (0..vertices).for_each(|v| starts[v + 1] += starts[v]);
     let mut sorted = vec![[0; 3]; turned.len()];

@@ -1,13 +1,10 @@
-//! Maps and sets of small numbers, with a hash that is faster than that of the standard library. Nothing depends on their order.
+//! Maps of small numbers, with a hash that is faster than that of the standard library. Nothing depends on their order.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 /// A map from numbers.
 pub(crate) type NumberMap<K, V> = HashMap<K, V, BuildHasherDefault<NumberHasher>>;
-
-/// A set of numbers.
-pub(crate) type NumberSet<K> = HashSet<K, BuildHasherDefault<NumberHasher>>;
 
 /// Multiplies by an odd number without a pattern, as in Knuth, "The Art of Computer Programming", 6.4.
 #[derive(Clone, Copy, Default)]
@@ -46,7 +43,7 @@ mod tests {
         let hash = |key: [u32; 2]| BuildHasherDefault::<NumberHasher>::default().hash_one(key);
         let (mut low, mut high) = ([0u32; 256], [0u32; 128]);
         let keys = (0..256).flat_map(|a| (0..256).map(move |b| [a, b]));
-        let all: HashSet<u64> = keys.map(hash).collect();
+        let all: std::collections::HashSet<u64> = keys.map(hash).collect();
         all.iter().for_each(|hash| {
             low[(hash & 255) as usize] += 1;
             high[(hash >> 57) as usize] += 1;

@@ -21,7 +21,7 @@ const MOST_CHUNKS: usize = 128;
 const RECORDS: u64 = 1 << 16;
 
 /// The records at which it looks in a chunk, where there are many.
-pub(crate) const POINTS_OF_PLACE: usize = RECORDS as usize / MOST_CHUNKS;
+const POINTS_OF_PLACE: usize = RECORDS as usize / MOST_CHUNKS;
 
 /// Where an index lists the chunks within bounds, they are few, and the sample would read much of them. A share of them is enough.
 const SHARE_OF_LISTED: usize = 4;
@@ -140,6 +140,11 @@ impl HeightSample {
     /// Returns the number of records at which it has looked.
     pub(crate) fn seen(&self) -> u64 {
         self.seen
+    }
+
+    /// Returns about how many of its points follow one another in their file.
+    pub(crate) fn points_of_place(&self) -> usize {
+        self.points.len().div_ceil(self.places.max(1))
     }
 
     /// Returns whether it has looked at all records.

@@ -14,7 +14,7 @@ use crate::plan::flat_points::flat_points;
 use crate::plan::geocentric_inputs::{refuse_geocentric, warn_of_degrees, warn_of_geocentric};
 use crate::plan::ground_cells::{GroundCells, KnownCloud};
 use crate::plan::ground_triangles::GroundTriangles;
-use crate::plan::height_range::{HeightSample, POINTS_OF_PLACE};
+use crate::plan::height_range::HeightSample;
 use crate::plan::inputs::{check_missing_records, named_inputs, open_all};
 use crate::plan::job_plan::{Claims, Plan, PlannedInput, SkippedInput, decoded_records};
 use crate::plan::lattice_choice::{LatticeCoarsening, LatticeRequest, choose_lattice, fineness};
@@ -22,7 +22,8 @@ use crate::plan::measured_inputs::measured_claims;
 use crate::plan::other_unit::{refuse_other_unit, warn_of_dropped_units};
 use crate::plan::stray_heights::JobHeights;
 use crate::plan::suspect_heights::check_suspect_heights;
-use crate::plan::terrain_crowd::{SampledCloud, TerrainCrowd};
+use crate::plan::terrain_crowd::TerrainCrowd;
+use crate::plan::terrain_sample::SampledCloud;
 use crate::plan::text_inputs::{
     check_malformed_rows, check_malformed_sample, farthest_row, refuse_degrees, refuse_missing_classes,
     refuse_missing_returns, row_choice, wanted_fields,
@@ -268,8 +269,9 @@ fn try_plan(
     let crowd = SampledCloud {
         crs: &crs,
         frame: &frame,
+        extent: clipped,
         sample: &sample.points,
-        of_place: POINTS_OF_PLACE,
+        of_place: sample.points_of_place(),
         records: decoded,
         seen: sample.seen(),
     };

@@ -40,5 +40,6 @@ pub(crate) mod stray_heights;
 pub(crate) mod stretch;
 pub(crate) mod suspect_heights;
 pub(crate) mod terrain_crowd;
+mod terrain_sample;
 pub mod text_inputs;
 mod zero_points;

@@ -135,6 +135,19 @@ proptest! {
     }
 }
 
+/// A crowd far denser than places waits as its places, not as its points.
+#[test]
+fn points_that_rounding_puts_in_one_place_are_one_vertex_of_a_piece() {
+    let mut crowd = terrain(3, 4_000, 900, 1);
+    for point in &mut crowd.points {
+        (point.x, point.y) = (point.x.div_euclid(60) + 5, point.y.div_euclid(60) + 5);
+    }
+    let places: BTreeSet<[i64; 2]> = crowd.points.iter().map(|point| [point.x, point.y]).collect();
+    let pieces = cut(&crowd.points, &crowd.triangles);
+    let vertices: usize = pieces.iter().map(|(_, piece)| piece.nodes.len()).sum();
+    assert!(vertices < 2 * places.len() && places.len() * 4 < crowd.points.len(), "{vertices} of {}", places.len());
+}
+
 #[test]
 fn all_that_the_finest_tiles_have_is_on_the_triangulation() {
     let terrain = terrain(5, 500, 60_000, 1);

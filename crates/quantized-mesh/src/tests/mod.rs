@@ -69,7 +69,7 @@ fn tiles(terrain: &Terrain, shares: usize) -> BTreeMap<[i32; 2], TileMesh> {
             pieces.entry(tile).or_default().insert(0, piece);
         }
     }
-    pieces.into_iter().filter_map(|(tile, pieces)| Some((tile, assemble(&pieces)?))).collect()
+    pieces.into_iter().filter_map(|(tile, pieces)| Some((tile, assemble(pieces)?))).collect()
 }
 
 /// Checks that a mesh covers its tile once, or more where rounding has turned triangles over, and ends at its sides alone.

@@ -7,6 +7,7 @@ use crate::publish::terrain_tiles::globe_grid::Place;
 use crate::publish::terrain_tiles::limits::{beyond_latitudes, refused};
 use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
+use quantized_mesh::Scheme;
 use sys::{Error, Result};
 use tiles::tiles3d::globe::Globe;
 
@@ -35,14 +36,62 @@ pub(crate) fn globe_of(plan: &Plan) -> Result<Globe> {
 pub(crate) fn check_terrain(plan: &Plan) -> Result<()> {
     let Some(scheme) = scheme_of(&plan.options) else { return Ok(()) };
     let globe = globe_of(plan)?;
-    Place::of(plan, &globe, plan.extent.middle()).map_err(|why| refused(&why))?;
+    let middle = Place::of(plan, &globe, plan.extent.middle()).map_err(|why| refused(&why))?;
+    check_latitudes(plan, &globe, scheme)?;
+    let shown = plan.terrain_crowd.map_or(0.0, |crowd| crowd.longitudes);
+    longitudes_within(shown.max(claimed_longitudes(plan, &globe, &middle)))
+}
+
+/// # Errors
+/// [`Error::Config`] if the boxes of the inputs come too near to a pole.
+fn check_latitudes(plan: &Plan, globe: &Globe, scheme: Scheme) -> Result<()> {
     // The box of all may be far more than where points are, such as around a pole. Those of the inputs decide then.
-    if highest_latitude(plan, &globe, plan.extent) <= scheme.most_latitude() {
+    if highest_latitude(plan, globe, plan.extent) <= scheme.most_latitude() {
         return Ok(());
     }
     let highest = plan.inputs.iter().filter_map(|input| claimed_within(input.claimed, plan.extent));
-    let highest = highest.map(|claimed| highest_latitude(plan, &globe, claimed)).fold(0.0, f64::max);
+    let highest = highest.map(|claimed| highest_latitude(plan, globe, claimed)).fold(0.0, f64::max);
     if highest > scheme.most_latitude() { Err(beyond_latitudes(scheme, highest)) } else { Ok(()) }
+}
+
+/// Returns how many degrees of longitude the terrain spans for sure by the boxes of the inputs: each has a point on each side.
+fn claimed_longitudes(plan: &Plan, globe: &Globe, middle: &Place) -> f64 {
+    const PARTS: i64 = 32;
+    // Bounds and areas cut boxes, and points may lie anywhere behind the cut.
+    if plan.options.input.rectangle().is_some() || plan.clip.is_some() {
+        return 0.0;
+    }
+    let of_side = |side: Bounds<2>| {
+        let places = grid_over(side, PARTS).map(|place| Place::of(plan, globe, place));
+        places.map(|place| place.map_or(0.0, |place| longitudes_from(middle, place))).fold(f64::MAX, f64::min)
+    };
+    plan.inputs.iter().flat_map(|input| sides(input.claimed)).map(of_side).fold(0.0, f64::max)
+}
+
+/// Returns the sides of a box, as boxes.
+fn sides(bounds: Bounds<2>) -> impl Iterator<Item = Bounds<2>> {
+    (0..2).flat_map(move |axis| {
+        let mut ends = [bounds; 2];
+        ends[0].max[axis] = bounds.min[axis];
+        ends[1].min[axis] = bounds.max[axis];
+        ends
+    })
+}
+
+/// Returns how many degrees of longitude a terrain spans that reaches as far to both sides of its middle as to this place.
+fn longitudes_from(middle: &Place, place: Place) -> f64 {
+    2.0 * (place.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs()
+}
+
+/// # Errors
+/// [`Error::Config`] if a terrain spans more degrees of longitude than terrain tiles take.
+fn longitudes_within(widest: f64) -> Result<()> {
+    if widest > MOST_LONGITUDES {
+        return Err(refused(&format!(
+            "the terrain spans about {widest:.0} degrees of longitude; {MOST_LONGITUDES} degrees is the limit"
+        )));
+    }
+    Ok(())
 }
 
 /// Returns what a box that an input claims shares with the extent of the job.
@@ -80,13 +129,5 @@ pub(super) fn check_longitudes(
     // Corners of a box may lie outside the range of a projection in which all points are.
     let places =
         boxes.flat_map(|bounds| grid_over(bounds, PARTS)).filter_map(|place| Place::of(plan, globe, place).ok());
-    let widest = places
-        .map(|place| 2.0 * (place.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs())
-        .fold(0.0, f64::max);
-    if widest > MOST_LONGITUDES {
-        return Err(refused(&format!(
-            "the terrain spans about {widest:.0} degrees of longitude; {MOST_LONGITUDES} degrees is the limit"
-        )));
-    }
-    Ok(())
+    longitudes_within(places.map(|place| longitudes_from(middle, place)).fold(0.0, f64::max))
 }

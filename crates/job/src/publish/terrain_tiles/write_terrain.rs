@@ -205,7 +205,7 @@ struct Lakes {
 /// The zooms that are written so far, the finest first.
 struct Pyramid<'a> {
     directory: &'a JobDirectory,
-    room: &'a Room,
+    room: &'a Room<'a>,
     surroundings: Surroundings,
     lakes: Option<Lakes>,
     stats: TerrainStats,

@@ -49,7 +49,7 @@ pub(super) struct WaitingPiece {
 }
 
 /// Bytes that a vertex of a tile takes while the tile is written: its mesh, the same in the order of the format, normals, and the bytes.
-const BYTES_TO_WRITE: u64 = 256;
+const BYTES_TO_WRITE: u64 = 160;
 
 /// Returns the bytes that the greatest tile of the zoom before that of these pieces takes while it is made, at most.
 fn to_select(pieces: &[WaitingPiece]) -> u64 {
@@ -81,7 +81,7 @@ impl Zoom {
         let made = room.share(&groups, load, to_select(&list), |group| {
             interrupt::check()?;
             let of_tile = group.iter().map(|piece| pieces.piece(piece.at)).collect::<Result<Vec<_>>>()?;
-            let made = assemble(&of_tile).map(|mesh| WaitingTile::add(&file, group[0].tile, &mesh, 0));
+            let made = assemble(of_tile).map(|mesh| WaitingTile::add(&file, group[0].tile, &mesh, 0));
             finish_tile();
             made.transpose()
         });
