@@ -218,7 +218,11 @@ mod tests {
         let most = |cells: &SiteCells| cells.points.iter().map(|cell| cell.points.len()).max();
         assert!(most(&cells) <= Some(MOST_PER_CELL) && cells.points.iter().any(|cell| cell.divided.is_some()));
         let mut rows = Vec::new();
-        cells.for_each_row(|points| -> Result<(), ()> { Ok(rows.extend_from_slice(points)) }).unwrap();
+        let take = |points: &[[i32; 3]]| -> Result<(), ()> {
+            rows.extend_from_slice(points);
+            Ok(())
+        };
+        cells.for_each_row(take).unwrap();
         rows.sort_unstable_by_key(|point| point[2]);
         assert_eq!(rows, crowd);
     }
