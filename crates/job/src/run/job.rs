@@ -131,7 +131,7 @@ impl<'a> Job<'a> {
             return Err(sys::Error::Broken(format!("part {part} is not meshed")));
         }
         let store = Arc::new(entries.store()?);
-        let tiles = SomeTiles::of(&entries)?;
+        let tiles = entries.tiles()?;
         let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, tiles, store });
         open.push_back((part, opened.clone()));
         if open.len() > KEPT_OPEN {

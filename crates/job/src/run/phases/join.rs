@@ -3,10 +3,9 @@
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::merge_records::{HullCount, Seam, SeamOfTile};
 use crate::mesh::merge::merge_frontiers;
-use crate::partition::part_points::ReadInputs;
 use crate::partition::tree::{NodeKind, Tree};
 use crate::plan::budget::merge_memory;
-use crate::records::{JobStep, StepRecord, Store};
+use crate::records::{FinishedBorder, JobStep, StepRecord, Store};
 use crate::run::folder::{Folder, once};
 use crate::run::job::{Job, OpenPart};
 use crate::run::meshed_part::MeshedPart;
@@ -16,7 +15,8 @@ use crate::tiles::appearance::TileAppearance;
 use crate::tiles::dependencies::FinishedTile;
 use crate::tiles::seam::seam_of;
 use serde::de::IgnoredAny;
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
 use sys::Result;
 use tiles::options::MaxEdge;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
@@ -29,6 +29,8 @@ pub(crate) struct JoinedParts {
     pub(crate) appearance: Arc<TileAppearance>,
     /// The key of the rule for long triangles, with `--update`.
     key_of_rule: u64,
+    /// Finished borders of tiles that tiles of other parts have asked for.
+    pub(super) borders: Mutex<HashMap<TileIndex, FinishedBorder>>,
 }
 
 /// Tells whether there is anything to do once all parts are meshed.
@@ -47,13 +49,8 @@ pub(crate) fn join_parts(job: &Job) -> crate::Result<()> {
     once(job, job.above(), JobStep::Join, key_of_meshes(job)?, |folder| {
         let parts = job.parts.all().len() as u64;
         let stage = job.progress.stage("join", parts, "parts");
-        let (mut sites, mut read) = (0, Vec::new());
-        for entries in job.parts.all().map(|part| job.entries(part)) {
-            let entries = entries?;
-            sites += entries.figures::<MeshedPart>(JobStep::Mesh)?.leaves.sites;
-            read.extend(entries.known::<ReadInputs>(JobStep::Read)?);
-        }
-        let all = SitesOfParts { sites, bounds: sum_up(job, read.iter())?.1 };
+        let sites = |part| Ok(job.entries(part)?.figures::<MeshedPart>(JobStep::Mesh)?.leaves.sites);
+        let all = SitesOfParts { sites: job.parts.all().map(sites).sum::<Result<_>>()?, bounds: sum_up(job)?.1 };
         merge_below(job, folder, NodeIndex::ROOT)?;
         count_sites(job, all, &folder.store)?;
         stage.advance(parts);
@@ -140,17 +137,16 @@ fn merge_at(job: &Job, folder: &Folder, node: NodeIndex, threads: usize) -> crat
 }
 
 impl JoinedParts {
-    /// Opens what [`join_parts`] has left; `None` if it is not complete.
+    /// Opens what [`join_parts`] has left.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on its folder.
-    pub(crate) fn open(job: &Job) -> Result<Option<JoinedParts>> {
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on its folder, also if that is not complete.
+    pub(crate) fn open(job: &Job) -> Result<JoinedParts> {
         if let (false, Some(appearance)) = (is_needed(job), early_appearance(job)?) {
-            return Ok(Some(JoinedParts { store: None, appearance, key_of_rule: 0 }));
+            return Ok(JoinedParts { store: None, appearance, key_of_rule: 0, borders: Mutex::default() });
         }
         let entries = job.entries(job.above())?;
-        let Some(all) = entries.known(JobStep::Join)? else { return Ok(None) };
-        let store = entries.store()?;
+        let (all, store) = (entries.figures(JobStep::Join)?, entries.store()?);
         let tree = &job.parts.tree;
         // Without the seam of a node, that node and those above it would be holes in the terrain.
         let merges = (0..tree.nodes.len()).map(NodeIndex::new).filter(|&node| tree.is_merge(node));
@@ -160,7 +156,7 @@ impl JoinedParts {
         let appearance = final_appearance(job, all, &store)?;
         let rule = if job.plan.options.updates { format!("{:?}", appearance.style.max_edge) } else { String::new() };
         let key_of_rule = xxh3_64(rule.as_bytes());
-        Ok(Some(JoinedParts { store: Some(store), appearance, key_of_rule }))
+        Ok(JoinedParts { store: Some(store), appearance, key_of_rule, borders: Mutex::default() })
     }
 
     /// Returns what is merged while parts are still to come.
@@ -169,7 +165,7 @@ impl JoinedParts {
     /// As [`JoinedParts::open`].
     pub(crate) fn so_far(job: &Job, appearance: Arc<TileAppearance>) -> Result<JoinedParts> {
         let store = is_needed(job).then(|| job.entries(job.above())?.store()).transpose()?;
-        Ok(JoinedParts { store, appearance, key_of_rule: 0 })
+        Ok(JoinedParts { store, appearance, key_of_rule: 0, borders: Mutex::default() })
     }
 
     /// Returns what all seams have of `tile` of the part with `store` and `tree`.

@@ -21,7 +21,7 @@ pub(crate) fn forget_outdated_tiles(job: &Job, joined: &JoinedParts) -> Result<(
         return Ok(());
     }
     let parts: Vec<PartIndex> = job.parts.all().collect();
-    let tiles_of = |&part: &PartIndex| SomeTiles::of(&job.entries(part)?);
+    let tiles_of = |&part: &PartIndex| job.entries(part)?.tiles();
     let known = parts.par_iter().map(tiles_of).collect::<sys::Result<Vec<SomeTiles>>>()?;
     let written: HashSet<TileIndex> = known.iter().flat_map(|tiles| &tiles.written).copied().collect();
     let waited: Vec<&WaitedTile> = known.iter().flat_map(|tiles| &tiles.waited).collect();

@@ -60,13 +60,14 @@ pub(crate) fn listed_points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<Poi
     Ok(points)
 }
 
-/// Sums up what all inputs held. Returns the sums and the box of the points.
+/// Sums up what all inputs held that are read. Returns the sums and the box of the points.
 ///
 /// # Errors
-/// [`sys::Error::Input`] if too many records are malformed, [`Error::NoTerrain`] or [`sys::Error::Config`] if no point is left,
+/// [`sys::Error::Io`] if a journal cannot be read, [`sys::Error::Input`] if too many records are malformed, [`Error::NoTerrain`] or [`sys::Error::Config`] if no point is left,
 /// [`Error::TooFine`] if no mesh can hold the heights.
-pub(crate) fn sum_up<'a>(job: &Job, read: impl Iterator<Item = &'a ReadInputs>) -> Result<(PointSummary, Bounds<3>)> {
-    let mut read: Vec<ReadInputs> = read.cloned().collect();
+pub(crate) fn sum_up(job: &Job) -> Result<(PointSummary, Bounds<3>)> {
+    let read = job.parts.all().map(|part| job.entries(part)?.known(JobStep::Read));
+    let mut read: Vec<ReadInputs> = read.filter_map(sys::Result::transpose).collect::<sys::Result<_>>()?;
     for inputs in &mut read {
         inputs.renumber_inputs(job.parts);
         inputs.rename_inputs(job.plan);

@@ -3,20 +3,18 @@
 use crate::index::{PartIndex, TileIndex};
 use crate::merge_records::SeamOfTile;
 use crate::partition::result::Partition;
-use crate::phase::Phase;
 use crate::progress::stage::Stage;
 use crate::records::{FinishedBorder, JobStep, StepRecord, Store};
 use crate::run::folder::Folder;
 use crate::run::job::{Job, OpenPart};
 use crate::run::meshed_part::{SomeTiles, WaitedTile};
 use crate::run::phases::join::JoinedParts;
-use crate::run::phases::part_progress::PartProgress;
 use crate::tiles::appearance::TileAppearance;
 use crate::tiles::border_normals::{finish_border_normals, finished_border};
 use crate::tiles::write_tile::{TileStats, write_tile};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, HashMap, HashSet};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::{BTreeMap, HashSet};
+use std::sync::{Arc, PoisonError};
 use sys::{Result, interrupt};
 
 /// The tiles of a part that are not written yet, each with the tiles that must be finished before it, if they are known.
@@ -34,12 +32,13 @@ pub(crate) fn waiting_tiles(OpenPart { partition, tiles, .. }: &OpenPart) -> Til
 ///
 /// # Errors
 /// Those of the steps; [`crate::Error::InUse`] if another process has the part.
-pub(crate) fn finish_part(borders: &ForeignBorders, part: PartIndex) -> crate::Result<TileStats> {
-    let progress = PartProgress::of(&borders.job.entries(part)?)?;
-    if progress.has(Phase::Tiles) {
-        return Ok(progress.tiles.stats);
+pub(crate) fn finish_part(job: &Job, joined: &JoinedParts, part: PartIndex) -> crate::Result<TileStats> {
+    let entries = job.entries(part)?;
+    let left = entries.tiles_left()?;
+    if left == Some(0) {
+        return Ok(entries.tiles()?.stats);
     }
-    let session = BorderSession::open(borders, part, progress.tiles_left())?;
+    let session = BorderSession::open(job, joined, part, left.unwrap_or_default())?;
     // What another process has written since is in the journal that is locked now.
     let (mut all, mut waiting) = (session.open.tiles.stats, waiting_tiles(&session.open));
     if !waiting.is_empty() {
@@ -52,7 +51,8 @@ pub(crate) fn finish_part(borders: &ForeignBorders, part: PartIndex) -> crate::R
 
 /// A part whose waiting tiles this process writes.
 pub(crate) struct BorderSession<'a> {
-    borders: &'a ForeignBorders<'a>,
+    job: &'a Job<'a>,
+    joined: &'a JoinedParts,
     folder: Folder,
     open: Arc<OpenPart>,
     part: PartIndex,
@@ -65,18 +65,18 @@ impl<'a> BorderSession<'a> {
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the folder, [`crate::Error::InUse`] if another process has the part.
     pub(crate) fn open(
-        borders: &'a ForeignBorders<'a>,
+        job: &'a Job<'a>,
+        joined: &'a JoinedParts,
         part: PartIndex,
         tiles: usize,
     ) -> crate::Result<BorderSession<'a>> {
-        let job = borders.job;
         let folder = Folder::open(job, part, 0)?;
         // What was opened before may be from before another process wrote here, and the store grows from now on.
         job.close(part);
         let open = job.open(part)?;
         job.close(part);
         let stage = job.progress.stage("write tiles", tiles as u64, "tiles");
-        Ok(BorderSession { borders, folder, open, part, stage })
+        Ok(BorderSession { job, joined, folder, open, part, stage })
     }
 
     pub(crate) fn store(&self) -> &Store {
@@ -88,8 +88,7 @@ impl<'a> BorderSession<'a> {
     }
 
     fn seam(&self, tile: TileIndex) -> Result<SeamOfTile> {
-        let ForeignBorders { job, joined, .. } = *self.borders;
-        joined.seam_of(job, self.store(), &self.partition().tree, tile)
+        self.joined.seam_of(self.job, self.store(), &self.partition().tree, tile)
     }
 
     /// Finishes the borders of those of the `waiting` tiles that are not `open`, because no merge can change them any more. Writes those whose
@@ -109,7 +108,7 @@ impl<'a> BorderSession<'a> {
         with_border.retain(|(tile, _)| waiting.contains_key(tile));
         let written: Vec<TileIndex> = ready.iter().map(|(tile, _)| *tile).collect();
         let each = self.write_each(&written)?;
-        let ForeignBorders { job, joined, .. } = *self.borders;
+        let BorderSession { job, joined, .. } = *self;
         let waited = |((tile, neighbours), &stats): (&(TileIndex, Vec<TileIndex>), &TileStats)| {
             Ok(WaitedTile { tile: *tile, stats, key: joined.key_of_tile(job, *tile)?, neighbours: neighbours.clone() })
         };
@@ -122,7 +121,7 @@ impl<'a> BorderSession<'a> {
 
     /// Finishes the borders of `tiles`. Returns each with the tiles that must be finished before it can be written.
     fn finish_borders(&self, tiles: &[TileIndex]) -> Result<Vec<(TileIndex, Vec<TileIndex>)>> {
-        let (tree, style) = (&self.partition().tree, &self.borders.joined.appearance.style);
+        let (tree, style) = (&self.partition().tree, &self.joined.appearance.style);
         let finish = |&tile: &TileIndex| {
             interrupt::check()?;
             Ok((tile, finish_border_normals(self.store(), tree, style, tile, &self.seam(tile)?)?))
@@ -132,10 +131,10 @@ impl<'a> BorderSession<'a> {
 
     /// Writes `tiles`, whose borders are finished. Returns the figures of each.
     fn write_each(&self, tiles: &[TileIndex]) -> Result<Vec<TileStats>> {
-        let TileAppearance { style, canvas } = &*self.borders.joined.appearance;
+        let TileAppearance { style, canvas } = &*self.joined.appearance;
         let border_of = |other: TileIndex| match other.part() == self.part {
             true => FinishedBorder::load(self.store(), other),
-            false => self.borders.of(other),
+            false => border_of_part(self.job, self.joined, other),
         };
         let write = |&tile: &TileIndex| {
             interrupt::check()?;
@@ -161,40 +160,25 @@ impl<'a> BorderSession<'a> {
 /// How many borders of other parts stay in memory, some ten kilobytes each.
 const MOST_KNOWN: usize = 1000;
 
-/// Finished borders of tiles of other parts. Those that are not stored yet are computed: a part's folder has one writer.
-pub(crate) struct ForeignBorders<'a> {
-    job: &'a Job<'a>,
-    joined: &'a JoinedParts,
-    known: Mutex<HashMap<TileIndex, FinishedBorder>>,
-}
-
-impl<'a> ForeignBorders<'a> {
-    /// Returns the borders of a job whose parts are joined as far as `joined` tells.
-    pub(crate) fn new(job: &'a Job<'a>, joined: &'a JoinedParts) -> ForeignBorders<'a> {
-        ForeignBorders { job, joined, known: Mutex::default() }
+/// Returns the finished border of a tile of another part. One that is not stored yet is computed: a part's folder has one writer.
+fn border_of_part(job: &Job, joined: &JoinedParts, tile: TileIndex) -> Result<FinishedBorder> {
+    let known = || joined.borders.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(border) = known().get(&tile) {
+        return Ok(border.clone());
     }
-
-    fn of(&self, tile: TileIndex) -> Result<FinishedBorder> {
-        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(border) = known().get(&tile) {
-            return Ok(border.clone());
+    let OpenPart { store, partition, .. } = &*job.open(tile.part())?;
+    // Another machine may be writing it. But what a written tile needed may be gone, and then it is whole.
+    let border = match store.has_whole(StepRecord::FinishedBorder(tile))? {
+        true => FinishedBorder::load(store, tile)?,
+        false => {
+            let seam = joined.seam_of(job, store, &partition.tree, tile)?;
+            finished_border(store, &partition.tree, &joined.appearance.style, tile, &seam)?
         }
-        let border = self.find(tile)?;
-        let mut known = known();
-        if known.len() >= MOST_KNOWN {
-            known.clear();
-        }
-        known.insert(tile, border.clone());
-        Ok(border)
+    };
+    let mut known = known();
+    if known.len() >= MOST_KNOWN {
+        known.clear();
     }
-
-    fn find(&self, tile: TileIndex) -> Result<FinishedBorder> {
-        let OpenPart { store, partition, .. } = &*self.job.open(tile.part())?;
-        // Another machine may be writing it. But what a written tile needed may be gone, and then it is whole.
-        if store.has_whole(StepRecord::FinishedBorder(tile))? {
-            return FinishedBorder::load(store, tile);
-        }
-        let seam = self.joined.seam_of(self.job, store, &partition.tree, tile)?;
-        finished_border(store, &partition.tree, &self.joined.appearance.style, tile, &seam)
-    }
+    known.insert(tile, border.clone());
+    Ok(border)
 }

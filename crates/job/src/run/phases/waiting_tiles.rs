@@ -7,7 +7,7 @@ use crate::records::StepRecord;
 use crate::run::job::Job;
 use crate::run::meshed_part::MeshedPart;
 use crate::run::phases::join::{JoinedParts, merge_through};
-use crate::run::phases::tile_phase::{BorderSession, ForeignBorders, TilesBefore, waiting_tiles};
+use crate::run::phases::tile_phase::{BorderSession, TilesBefore, waiting_tiles};
 use crate::tiles::appearance::TileAppearance;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
@@ -72,9 +72,8 @@ impl<'a> WaitingTiles<'a> {
         let mut due = waiting.iter_mut().filter(|(_, part)| part.tiles.iter().any(is_due)).peekable();
         if due.peek().is_some() {
             let joined = JoinedParts::so_far(job, appearance.clone())?;
-            let borders = &ForeignBorders::new(job, &joined);
             for (&part, WaitingPart { tiles, outer, is_kept }) in due {
-                let session = BorderSession::open(borders, part, tiles.len())?;
+                let session = BorderSession::open(job, &joined, part, tiles.len())?;
                 let before = session.store().bytes();
                 let some = session.write_ready(tiles, open)?;
                 if !*is_kept {
