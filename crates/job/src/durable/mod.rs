@@ -7,7 +7,6 @@ mod bits;
 pub mod cleaning;
 pub mod columns;
 pub mod directory;
-pub(crate) mod file_list;
 pub mod journal;
 pub(crate) mod known_results;
 pub(crate) mod listing;

@@ -3,7 +3,7 @@
 
 use crate::durable::cleaning::remove_job;
 use crate::durable::directory::JobDirectory;
-use crate::durable::listing::entries;
+use crate::durable::listing::{entries, exists};
 use crate::durable::lock::Lock;
 use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::options::{JobOptions, RunOptions};
@@ -72,11 +72,12 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
     if !entries(directory.job())?.is_empty() {
         // Before anything else can fail: an earlier run may have been cut off while its results took their places.
         lock = Some(Lock::take(directory.job())?);
-        earlier = read_earlier(&directory, run)?;
-        if earlier.is_none() && options.updates && has_first_plan(&directory)? {
-            let path = directory.journal();
+        earlier = EarlierRun::read(&directory, run)?;
+        let (path, has_journal) = (directory.journal(), exists(&directory.journal())?);
+        if !has_journal && options.updates && has_first_plan(&directory)? {
             run.progress.note(&format!("{} is missing: everything is computed again", path.display()));
-        } else if let (None, false) = (&earlier, run.restart)
+        } else if !has_journal
+            && !run.restart
             && let InPlace::ThisJob(report) = results_in_place(&directory, options, run.submission)?
         {
             run.progress.note("the interrupted run had put all its results in place");
@@ -84,8 +85,7 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
             return Ok(*report);
         }
     }
-    let known = earlier.as_ref().map_or(0, |earlier| earlier.submission);
-    let submission = known.max(run.submission).max(known_submission(&directory)?);
+    let submission = run.submission.max(known_submission(&directory)?);
     // Before the inputs, so that a job that must have a GPU fails at once if there is none.
     let memory = options.limits.memory.0;
     let triangulator = match is_by_tasks {
@@ -155,21 +155,6 @@ pub(crate) fn may_coarsen(options: &JobOptions, vertical: bool) -> bool {
     set.step().is_none()
 }
 
-/// Reads what an earlier run left, unless the job is to start over. If it left all its results, they take their places in any case:
-/// it may have been cut off among them.
-pub(crate) fn read_earlier(directory: &JobDirectory, run: RunOptions) -> sys::Result<Option<EarlierRun>> {
-    let mut earlier = EarlierRun::read(directory)?;
-    if let Some(earlier) = earlier.as_mut() {
-        earlier.place_whole_results(directory, run.progress)?;
-        if run.restart || earlier.submission < run.submission {
-            earlier.forget();
-        } else if !earlier.is_readable() {
-            run.progress.note("the journal of the earlier run is damaged or of another version; starting over");
-        }
-    }
-    Ok(earlier)
-}
-
 fn attempt(
     job: &JobRequest,
     coarsening: LatticeCoarsening,
@@ -203,7 +188,7 @@ fn attempt(
         None => {
             let lock = Lock::take(directory.job())?;
             // Another process may have begun the job, and stopped, since this one looked.
-            earlier = read_earlier(directory, run)?;
+            earlier = EarlierRun::read(directory, run)?;
             lock
         }
     };
@@ -211,7 +196,7 @@ fn attempt(
         progress.note(NO_LOCKS);
     }
     // Tasks have worked since the plan, and this process only ends it.
-    let begun = earlier.as_ref().filter(|_| is_by_tasks).and_then(|earlier| earlier.begun());
+    let begun = earlier.as_ref().filter(|_| is_by_tasks).and_then(|earlier| earlier.header.begun);
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
         if options.updates {

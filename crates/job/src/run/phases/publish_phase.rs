@@ -1,7 +1,7 @@
 //! Step 8: the coarser tiles above the parts, what is beside the tiles, and the report.
 
 use crate::durable::atomic_file::write_pending;
-use crate::durable::file_list::listed;
+use crate::durable::journal::listed;
 use crate::index::{PartIndex, TileIndex};
 use crate::levels::hierarchy::Hierarchy;
 use crate::levels::make_level::{Child, LevelStats};

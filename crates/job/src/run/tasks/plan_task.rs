@@ -13,7 +13,6 @@ use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::contour_estimate::ContourSample;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
-use crate::run::attempt::read_earlier;
 use crate::run::earlier_run::{EarlierRun, PlanOrigin, start};
 use crate::run::finished::known_submission;
 use crate::run::phases::plan_phase::{find_plan, note_skipped, write_plan};
@@ -36,12 +35,10 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     }
     check_results_are_ours(directory, options.output.page)?;
     let _lock = Lock::take(directory.job())?;
-    let mut earlier = read_earlier(directory, run)?;
-    if let Some(earlier) = earlier.as_mut()
-        && let Some(what) = modified_inputs(earlier, &fingerprint)
-    {
+    let mut earlier = EarlierRun::read(directory, run)?;
+    if let Some(what) = earlier.as_ref().and_then(|earlier| modified_inputs(earlier, &fingerprint)) {
         run.progress.note(&format!("changed since the interrupted run: {what}; starting over"));
-        earlier.forget();
+        earlier = None;
     }
     let coarsening = earlier.as_ref().and_then(|earlier| earlier.coarsening(&fingerprint)).unwrap_or_default();
     let submission = run.submission.max(known_submission(directory)?);
@@ -73,8 +70,8 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
 /// Returns the inputs that seem to have been modified since the same job was planned. Two changes within a second leave the same time in
 /// the fingerprint, and yet tasks refuse what was modified after the plan.
 fn modified_inputs(earlier: &EarlierRun, now: &Fingerprint) -> Option<String> {
-    let planned = earlier.header.as_ref().filter(|planned| now.since_planned(&planned.fingerprint).is_none())?;
-    now.modified_since(planned)
+    let is_same = now.since_planned(&earlier.header.fingerprint).is_none();
+    now.modified_since(&earlier.header).filter(|_| is_same)
 }
 
 /// Tells whether the job with this fingerprint is planned. Nobody starts it over meanwhile.
