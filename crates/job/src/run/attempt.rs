@@ -73,8 +73,9 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
         // Before anything else can fail: an earlier run may have been cut off while its results took their places.
         lock = Some(Lock::take(directory.job())?);
         earlier = EarlierRun::read(&directory, run)?;
-        let (path, has_journal) = (directory.journal(), exists(&directory.journal())?);
+        let has_journal = exists(&directory.journal())?;
         if !has_journal && options.updates && has_first_plan(&directory)? {
+            let path = directory.journal();
             run.progress.note(&format!("{} is missing: everything is computed again", path.display()));
         } else if !has_journal
             && !run.restart

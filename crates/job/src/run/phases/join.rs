@@ -46,7 +46,8 @@ pub(crate) fn join_parts(job: &Job) -> crate::Result<()> {
     if !is_needed(job) {
         return Ok(());
     }
-    once(job, job.above(), JobStep::Join, key_of_meshes(job)?, |folder| {
+    let key = job.key(|| key_of_meshes(job))?;
+    once(job, job.above(), JobStep::Join, key, |folder| {
         let parts = job.parts.all().len() as u64;
         let stage = job.progress.stage("join", parts, "parts");
         let sites = |part| Ok(job.entries(part)?.figures::<MeshedPart>(JobStep::Mesh)?.leaves.sites);
@@ -59,11 +60,8 @@ pub(crate) fn join_parts(job: &Job) -> crate::Result<()> {
     .map(|_| ())
 }
 
-/// Returns the key of the merges above the parts, with `--update`: a hash of the keys of all meshes. Else 0.
+/// Returns the key of the merges above the parts: a hash of the keys of all meshes.
 fn key_of_meshes(job: &Job) -> Result<u64> {
-    if !job.plan.options.updates {
-        return Ok(0);
-    }
     let mut keys = Vec::new();
     for part in job.parts.all() {
         keys.extend(job.entries(part)?.done::<IgnoredAny>(JobStep::Mesh)?.map(|mesh| mesh.key));

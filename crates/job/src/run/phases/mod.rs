@@ -72,7 +72,7 @@ pub(crate) fn do_phases(run: &WholeRun, plan: Plan) -> Result<Report> {
 
 /// Reads and meshes all parts, or those that an interrupted run left.
 fn read_and_mesh(job: &Job) -> Result<()> {
-    // Bytes of points that wait, by part, and of what is stored of parts that are meshed.
+    // Bytes of points that wait, by part, and bytes that parts keep once they are meshed.
     let (mut malformed, mut waiting, mut stored) = (0, vec![0; job.parts.all().len()], 0);
     let mut read_next = |part: PartIndex, waiting: &mut [u64]| -> Result<()> {
         let inputs = read_for(job, part, malformed)?;
@@ -95,11 +95,10 @@ fn read_and_mesh(job: &Job) -> Result<()> {
         if !selects {
             read_next(part, &mut waiting)?;
         }
-        let others =
-            waiting[part.get() + 1..].iter().sum::<u64>() + front.as_ref().map_or(stored, WaitingTiles::stored);
+        let others = waiting[part.get() + 1..].iter().sum::<u64>() + stored;
         let meshed = mesh_one(job, part, appearance.as_ref(), Some(others))?;
         stored += meshed.stored;
-        front.as_mut().map(|front| front.pass(part, &meshed)).transpose()?;
+        front.as_mut().map(|front| front.pass(part, meshed, &mut stored)).transpose()?;
     }
     sum_up(job).map(|_| ())
 }

@@ -7,13 +7,13 @@ use crate::levels::hierarchy::Hierarchy;
 use crate::levels::make_level::{Child, LevelStats};
 use crate::progress::stage::Stage;
 use crate::publish::classified::{ClassifiedInputs, write_all};
-use crate::publish::contours::write_contours::{ContourStats, ContourWork};
+use crate::publish::contours::write_contours::ContourWork;
 use crate::publish::exports::write_exports::{ExportWork, Exports};
 use crate::publish::map_tiles::write_map_tiles::MapTileWork;
 use crate::publish::published::Published;
 use crate::publish::raster::write_raster::RasterWork;
 use crate::publish::side_files::{EachTile, write_side_files};
-use crate::publish::terrain_tiles::write_terrain::TerrainWork;
+use crate::publish::terrain_tiles::write_terrain::{TerrainStats, TerrainWork};
 use crate::publish::tileset_tree::TilesOfTree;
 use crate::publish::written_tiles::{WrittenTiles, check_some_triangles, wants_tileset};
 use crate::records::{JobStep, Store};
@@ -29,7 +29,7 @@ use crate::run::phases::select_phase::{SelectedPart, found_ground};
 use crate::run::update::changes::write_changes;
 use crate::run::whole_run::WholeRun;
 use serde::de::IgnoredAny;
-use sys::{Error, Result, Warnings};
+use sys::{Error, Result};
 use tiles::checksums::list_text;
 use tiles::tiles3d::tileset::TilesetNode;
 
@@ -200,64 +200,59 @@ fn publish(
 ) -> Result<Published> {
     let (plan, directory, tiles) = (job.plan, job.directory, written.tiles);
     let style = &written.appearance.style;
-    let mut warnings = Warnings::default();
-    let (mut raster, mut map_tiles, mut contours, mut terrain) = (None, None, None, None);
+    let mut published = Published { vertex_colors: style.colors.source(), ..Published::default() };
     if let Some(work) = RasterWork::of(plan, &style.frame, tiles)? {
         let stage = ("raster", work.blocks(), "blocks");
         let stats = run.write(JobStep::Raster, stage, |stage| work.write(directory, &|| stage.advance(1)))?;
-        warnings.extend(work.warnings(directory, &stats)?);
-        raster = Some(stats);
+        published.warnings.extend(work.warnings(directory, &stats)?);
+        published.bytes += stats.bytes;
+        published.raster = Some(stats);
         if let Some(work) = MapTileWork::of(plan, work.grid())? {
             let stage = ("map tiles", work.tiles(), "tiles");
             let write = |stage: &Stage| work.write(directory, &|| stage.advance(1));
-            map_tiles = Some(run.write(JobStep::MapTiles, stage, write)?);
+            let stats = run.write(JobStep::MapTiles, stage, write)?;
+            published.bytes += stats.bytes;
+            published.map_tiles = Some(stats);
         }
     }
     if let Some(work) = ContourWork::of(plan, &style.frame, tiles)? {
         let stage = ("contours", work.steps(), "steps");
         let write = |stage: &Stage| work.write(directory, &|steps| stage.advance(steps));
-        contours = Some(run.write(JobStep::Contours, stage, write)?);
+        let stats = run.write(JobStep::Contours, stage, write)?;
+        published.warnings.extend(stats.warning());
+        published.bytes += stats.bytes;
+        published.contours = Some(stats);
     }
-    warnings.extend(contours.as_ref().and_then(ContourStats::warning));
-    let mut exports = Exports::default();
     if let Some(work) = ExportWork::of(plan, &style.frame, tiles, &written.stats)? {
         let stage = ("export", work.reads(), "triangles read");
         let write = |stage: &Stage| work.write(directory, &|triangles| stage.advance(triangles));
-        exports = run.write(JobStep::Exports, stage, write)?;
+        let exports: Exports = run.write(JobStep::Exports, stage, write)?;
+        published.warnings.extend(exports.warnings);
+        published.bytes += exports.files.iter().map(|file| file.bytes).sum::<u64>();
+        published.exports = exports.files;
     }
-    warnings.extend(exports.warnings);
     if let Some(work) = TerrainWork::of(plan, &style.frame, tiles, &written.stats)? {
         let stage = ("terrain", work.steps(), "tiles");
         let write = |stage: &Stage| work.write(directory, &|steps| stage.advance(steps));
-        terrain = Some(run.write(JobStep::Terrain, stage, write)?);
+        let stats: TerrainStats = run.write(JobStep::Terrain, stage, write)?;
+        published.bytes += stats.bytes;
+        published.terrain = Some(stats);
     }
-    let mut classified = ClassifiedInputs::default();
     if plan.options.output.classified {
         let (stage, ground) = (("classify", plan.records, "points"), found_ground(job)?);
         let write = |stage: &Stage| write_all(plan, &ground, directory, &|records| stage.advance(records));
-        classified = run.write(JobStep::Classified, stage, write)?;
+        let classified: ClassifiedInputs = run.write(JobStep::Classified, stage, write)?;
+        published.warnings.extend(classified.warnings);
+        published.bytes += classified.bytes;
     }
-    warnings.extend(classified.warnings);
     let (root, levels) = tileset.unzip();
-    warnings.extend(levels.and_then(|levels| levels.left_out_warning(plan)));
-    let content = written.side_files(plan, directory, root, &mut warnings)?;
-    let mut bytes = run.write(JobStep::Publish, ("publish", 1, "job"), |stage| {
+    published.levels = levels.unwrap_or_default();
+    published.warnings.extend(levels.and_then(|levels| levels.left_out_warning(plan)));
+    let content = written.side_files(plan, directory, root, &mut published.warnings)?;
+    published.bytes += run.write(JobStep::Publish, ("publish", 1, "job"), |stage| {
         let files = write_side_files(directory, &content, &written.appearance.canvas, tiles)?;
         stage.advance(1);
         Ok(files)
     })?;
-    bytes += exports.files.iter().map(|file| file.bytes).sum::<u64>() + classified.bytes;
-    bytes += raster.map_or(0, |raster| raster.bytes) + map_tiles.map_or(0, |tiles| tiles.bytes);
-    bytes += contours.map_or(0, |lines| lines.bytes) + terrain.as_ref().map_or(0, |tiles| tiles.bytes);
-    Ok(Published {
-        bytes,
-        levels: levels.unwrap_or_default(),
-        raster,
-        map_tiles,
-        contours,
-        exports: exports.files,
-        terrain,
-        vertex_colors: style.colors.source(),
-        warnings,
-    })
+    Ok(published)
 }

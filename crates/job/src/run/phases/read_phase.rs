@@ -9,7 +9,6 @@ use crate::plan::no_points::no_point_is_left;
 use crate::records::JobStep;
 use crate::run::folder::once;
 use crate::run::job::Job;
-use crate::run::update::outdated::forget_from;
 use crate::{Error, Result};
 use delaunay::geometry::Bounds;
 
@@ -22,7 +21,7 @@ pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<R
     let inputs = parts.new_inputs(reader);
     if inputs.is_empty() {
         if plan.options.updates && job.entries(reader)?.has(JobStep::Read) {
-            forget_from(job, reader, JobStep::Read)?;
+            job.forget_from(reader, JobStep::Read)?;
         }
         return Ok(ReadInputs::default());
     }

@@ -50,7 +50,7 @@ pub(crate) fn selects(plan: &Plan) -> bool {
 /// [`sys::Error::Config`] if the memory does not hold the selection.
 pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     let bound = error_bound(job.plan)?;
-    let key = key_of_all_points(job)?;
+    let key = job.key(|| key_of_all_points(job))?;
     let is_done = |part| Ok(done_with::<IgnoredAny>(job, part, JobStep::Select, key)?.is_some());
     if job.parts.all().map(is_done).collect::<Result<Vec<bool>>>()?.into_iter().all(|is_done| is_done) {
         return know_selection(job);
@@ -106,11 +106,8 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     Ok(())
 }
 
-/// Returns the key of the selection, with `--update`: the digest of the points of all parts, and which triangles are asked about. Else 0.
+/// Returns the key of the selection: the digest of the points of all parts, and which triangles are asked about.
 fn key_of_all_points(job: &Job) -> Result<u64> {
-    if !job.plan.options.updates {
-        return Ok(0);
-    }
     job.parts
         .all()
         .try_fold(key_of_lengths(job), |all, part| Ok(all.wrapping_add(listed_points_of(job, part)?.digest())))
@@ -142,15 +139,12 @@ fn key_of_lengths(job: &Job) -> u64 {
     xxh3_64(&HullRule::of_lengths(job.plan).key().to_le_bytes())
 }
 
-/// Returns the key of the mesh of a part, with `--update`: the digest of its vertices, and of the long triangles on ground among them. Else 0.
+/// Returns the key of the mesh of a part: the digest of its vertices, and of the long triangles on ground among them.
 /// Which triangles flow is found with the mesh.
 ///
 /// # Errors
 /// As [`vertices_of`].
 pub(crate) fn key_of_vertices(job: &Job, part: PartIndex) -> Result<u64> {
-    if !job.plan.options.updates {
-        return Ok(0);
-    }
     if !selects(job.plan) {
         return Ok(listed_points_of(job, part)?.digest().wrapping_add(key_of_lengths(job)));
     }

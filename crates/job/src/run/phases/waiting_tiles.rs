@@ -9,18 +9,9 @@ use crate::run::meshed_part::MeshedPart;
 use crate::run::phases::join::{JoinedParts, merge_through};
 use crate::run::phases::tile_phase::{BorderSession, TilesBefore, waiting_tiles};
 use crate::tiles::appearance::TileAppearance;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 use sys::Result;
-
-/// A part with tiles that are not written yet.
-struct WaitingPart {
-    tiles: TilesBefore,
-    /// The tiles that touch other parts.
-    outer: HashSet<TileIndex>,
-    /// Whether the mesh stays once it is written.
-    is_kept: bool,
-}
 
 /// The tiles that wait for parts to come.
 pub(crate) struct WaitingTiles<'a> {
@@ -28,70 +19,57 @@ pub(crate) struct WaitingTiles<'a> {
     appearance: Arc<TileAppearance>,
     /// The tiles that merges may still change.
     open: HashSet<TileIndex>,
-    waiting: BTreeMap<PartIndex, WaitingPart>,
-    /// The bytes that the store of each part keeps.
-    stored: HashMap<PartIndex, u64>,
+    /// The parts with tiles that are not written yet.
+    waiting: BTreeMap<PartIndex, (TilesBefore, MeshedPart)>,
 }
 
 impl<'a> WaitingTiles<'a> {
     /// Returns the front before any part is done.
     pub(crate) fn new(job: &'a Job<'a>, appearance: Arc<TileAppearance>) -> WaitingTiles<'a> {
-        let (open, waiting, stored) = (HashSet::new(), BTreeMap::new(), HashMap::new());
-        WaitingTiles { job, appearance, open, waiting, stored }
+        WaitingTiles { job, appearance, open: HashSet::new(), waiting: BTreeMap::new() }
     }
 
-    /// Returns the bytes that all parts so far keep on the disk.
-    pub(crate) fn stored(&self) -> u64 {
-        self.stored.values().sum()
-    }
-
-    /// Takes `part`, which is meshed: merges what is complete now, and writes the tiles that have waited for that.
+    /// Takes `part`, which is `meshed`: merges what is complete now, and writes the tiles that have waited for that. Corrects `stored`, the bytes
+    /// that all parts so far keep on the disk.
     ///
     /// # Errors
     /// Those of the steps.
-    pub(crate) fn pass(&mut self, part: PartIndex, meshed: &MeshedPart) -> crate::Result<()> {
-        let opened = self.job.open(part)?;
-        self.stored.insert(part, opened.store.bytes());
+    pub(crate) fn pass(&mut self, part: PartIndex, meshed: MeshedPart, stored: &mut u64) -> crate::Result<()> {
         self.open.extend(&meshed.open);
-        let tiles = waiting_tiles(&opened);
-        self.waiting
-            .insert(part, WaitingPart { tiles, outer: meshed.open.iter().copied().collect(), is_kept: meshed.is_kept });
-        drop(opened);
+        self.waiting.insert(part, (waiting_tiles(&*self.job.open(part)?), meshed));
         for tile in merge_through(self.job, part)? {
             self.open.remove(&tile);
         }
-        self.write_ready_tiles()
+        self.write_ready_tiles(stored)
     }
 
-    fn write_ready_tiles(&mut self) -> crate::Result<()> {
-        let WaitingTiles { job, appearance, open, waiting, stored } = self;
+    fn write_ready_tiles(&mut self, stored: &mut u64) -> crate::Result<()> {
+        let WaitingTiles { job, appearance, open, waiting } = self;
         let is_due = |(tile, before): (&TileIndex, &Option<Vec<TileIndex>>)| {
             let all = before.iter().flatten().chain([tile]);
             all.into_iter().all(|tile| !open.contains(tile))
         };
-        let mut due = waiting.iter_mut().filter(|(_, part)| part.tiles.iter().any(is_due)).peekable();
+        let mut due = waiting.iter_mut().filter(|(_, (tiles, _))| tiles.iter().any(is_due)).peekable();
         if due.peek().is_some() {
             let joined = JoinedParts::so_far(job, appearance.clone())?;
-            for (&part, WaitingPart { tiles, outer, is_kept }) in due {
+            for (&part, (tiles, meshed)) in due {
                 let session = BorderSession::open(job, &joined, part, tiles.len())?;
                 let before = session.store().bytes();
                 let some = session.write_ready(tiles, open)?;
-                if !*is_kept {
-                    free_written(&session, &some.written, tiles.is_empty().then_some(&*outer))?;
+                if !meshed.is_kept {
+                    free_written(&session, &some.written, tiles.is_empty().then_some(&meshed.open))?;
                 }
-                let after = session.finish(some)?;
-                let kept = stored.entry(part).or_default();
-                *kept = (*kept + after).saturating_sub(before);
+                *stored = (*stored + session.finish(some)?).saturating_sub(before);
             }
         }
-        self.waiting.retain(|_, part| !part.tiles.is_empty());
+        self.waiting.retain(|_, (tiles, _)| !tiles.is_empty());
         Ok(())
     }
 }
 
 /// Gives up what `written` tiles needed. Once all tiles of a part are written, also what else no phase needs any more: all but the borders of
 /// its `outer` tiles, which other parts may still ask for.
-fn free_written(session: &BorderSession, written: &[TileIndex], outer: Option<&HashSet<TileIndex>>) -> Result<()> {
+fn free_written(session: &BorderSession, written: &[TileIndex], outer: Option<&Vec<TileIndex>>) -> Result<()> {
     let (store, partition) = (session.store(), session.partition());
     let tree = &partition.tree;
     written.iter().flat_map(|&tile| partition.records_of_leaf(tile)).try_for_each(|record| store.free(record))?;
