@@ -32,7 +32,7 @@ use crate::run::update::mending::Mended;
 use crate::run::whole_run::WholeRun;
 use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
-use std::sync::Mutex;
+use std::cell::RefCell;
 use sys::ErrorKind;
 use sys::threads::on_threads;
 
@@ -242,7 +242,7 @@ fn attempt(
             begun,
             identity: job.fingerprint.identity(options, job.submission)?,
             resumed: told,
-            stages: Mutex::new(vec![planned]),
+            stages: RefCell::new(vec![planned]),
         };
         // What tasks left was not compared with its hashes, and a disk may fail meanwhile.
         let outcome = do_phases(&whole_run, plan).map_err(|error| match error {

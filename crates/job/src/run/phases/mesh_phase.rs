@@ -11,13 +11,12 @@ use crate::records::{JobStep, JournalEntry, RecordChanges, StepRecord, Store};
 use crate::run::folder::{Folder, once};
 use crate::run::job::Job;
 use crate::run::meshed_part::{MeshedPart, SomeTiles};
-use crate::run::phases::postponed_merges::PostponedMerges;
 use crate::run::phases::select_phase::{key_of_vertices, vertices_of};
 use crate::run::phases::tile_queue::TileQueue;
 use crate::run::phases::tree_walk::TreeWalk;
 use crate::tiles::appearance::TileAppearance;
 use std::collections::HashSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// Meshes a part whose points have all been read, unless that is done. With an `appearance` its finished tiles are written meanwhile.
 /// Temporary files of other parts take `others` bytes; `None` where nothing tells.
@@ -93,11 +92,11 @@ fn mesh_in_tiles(
     let activity = job.progress.activity("triangulate", "points");
     let queue = TileQueue::new(job, folder, partition, &stage, appearance.cloned());
     let points = PointFiles::open(&folder.directory.point_files()?)?;
-    let unmerged = PostponedMerges::default();
+    let unmerged = Mutex::default();
     let walk = TreeWalk { job, folder, partition, points, stage: &stage, activity: &activity, queue: &queue, unmerged };
     let leaves = rayon::scope(|scope| {
         let leaves = walk.walk(scope, NodeIndex::ROOT);
-        queue.attempt(|| walk.unmerged.check(&job.plan.options));
+        queue.attempt(|| walk.check_memory());
         leaves
     });
     // This closes the point files: an open file is not freed when it is removed.

@@ -11,7 +11,6 @@ pub(crate) mod mesh_phase;
 mod outdated_levels;
 mod outdated_tiles;
 pub(crate) mod plan_phase;
-mod postponed_merges;
 pub(crate) mod publish_phase;
 pub(crate) mod read_phase;
 pub(crate) mod select_phase;

@@ -79,7 +79,7 @@ pub(crate) fn publish_job(run: &WholeRun, job: &Job, joined: &JoinedParts) -> cr
         triangulator: job.triangulator,
         update,
         wall_s: run.wall_s(),
-        stages: std::mem::take(&mut *run.stages()),
+        stages: run.stages.take(),
         threads: job.threads,
         resumed: run.resumed,
         clock: job.clock,
