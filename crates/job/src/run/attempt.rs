@@ -21,7 +21,7 @@ use crate::progress::stage::JobProgress;
 use crate::report::change_counts::ChangeCounts;
 use crate::report::job_report::Report;
 use crate::run::damage::{damaged_by_tasks, is_damage};
-use crate::run::earlier_run::{EarlierRun, PlanOrigin, RunStart, place_results_of_finished_job, start};
+use crate::run::earlier_run::{EarlierRun, PlanOrigin, place_results_of_finished_job, start};
 use crate::run::finished::{InPlace, known_submission, replaced_terrain, results_in_place};
 use crate::run::job::Process;
 use crate::run::part_entries::PartEntries;
@@ -222,7 +222,7 @@ fn attempt(
     job.triangulator.prepare(plan.records, threads);
     let keeps_mesh = plan.keeps_mesh();
     on_threads(threads, || {
-        let RunStart { journal, job_id, resumed } =
+        let (journal, JobHeader { id, .. }, resumed) =
             start(directory, &header, earlier, origin, is_by_tasks, run.progress)?;
         // That tasks or an earlier run have done phases is nothing to tell.
         let told = if is_by_tasks || is_update { 0 } else { resumed };
@@ -232,7 +232,7 @@ fn attempt(
             progress,
             threads,
             clock,
-            id: job_id,
+            id,
             checks_points: told > 0 || options.updates,
             is_task: false,
         };
@@ -251,7 +251,7 @@ fn attempt(
         });
         // If the journals cannot be read now, something may be kept.
         let count = |parts: Vec<PartEntries>| parts.iter().map(|part| part.entries.len() as u64).sum();
-        let of_parts = || PartEntries::of_all(directory, job_id).map_or(1, count);
+        let of_parts = || PartEntries::of_all(directory, id).map_or(1, count);
         let phases = journal.complete() + if outcome.is_err() { of_parts() } else { 0 };
         drop(journal);
         job.end(outcome, phases, keeps_mesh, is_update)

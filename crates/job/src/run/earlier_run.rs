@@ -323,19 +323,10 @@ pub(crate) fn place_results_of_finished_job(directory: &JobDirectory, updates: b
     place_changes(directory)
 }
 
-/// Where a run begins.
-pub(crate) struct RunStart {
-    /// Which phases of the whole job are complete.
-    pub(crate) journal: Journal,
-    /// Tells the folders of this job's parts from those of others.
-    pub(crate) job_id: u64,
-    /// The number of phases that are complete.
-    pub(crate) resumed: u64,
-}
-
 /// Begins a run of the job with `header` in its locked directory: takes over what is the same from the earlier run if it is whole, and
 /// otherwise removes everything. `origin` tells whose its plan is. What tasks have done is not compared with its hashes
-/// (`is_by_tasks`), because it was on the disk before others counted on it.
+/// (`is_by_tasks`), because it was on the disk before others counted on it. Returns the journal of the job with its header, and the number of
+/// phases that are complete.
 ///
 /// # Errors
 /// [`Error::Io`] on the job directory.
@@ -346,7 +337,7 @@ pub(crate) fn start(
     origin: PlanOrigin,
     is_by_tasks: bool,
     progress: ProgressOutput,
-) -> Result<RunStart> {
+) -> Result<(Journal, JobHeader, u64)> {
     let (is_update, has_plan) = (origin == PlanOrigin::Update, origin == PlanOrigin::Kept);
     let progress_of_tasks = if is_by_tasks { ProgressOutput::Quiet } else { progress };
     let mut kept = earlier.and_then(|earlier| earlier.kept_for(header, origin, progress_of_tasks));
@@ -368,7 +359,7 @@ pub(crate) fn start(
         let begun = header.begun.or(Some(SystemTime::now()));
         let header = JobHeader { id: new_id(), begun, ..header.clone() };
         let journal = Journal::begin(directory, &header, Vec::new())?;
-        return Ok(RunStart { journal, job_id: header.id, resumed: 0 });
+        return Ok((journal, header, 0));
     };
     let resumed = (entries.len() + parts.iter().map(|part| part.entries.len()).sum::<usize>()) as u64;
     if is_update {
@@ -386,7 +377,7 @@ pub(crate) fn start(
         drop(Journal::begin(&directory, &header, entries)?);
     }
     let header = JobHeader { fingerprint, id: old.id, begun: old.begun, ..*header };
-    Ok(RunStart { journal: Journal::begin(directory, &header, entries)?, job_id: header.id, resumed })
+    Ok((Journal::begin(directory, &header, entries)?, header, resumed))
 }
 
 /// Returns a number that no other run has.

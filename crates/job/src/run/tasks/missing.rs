@@ -8,7 +8,7 @@ use crate::plan::budget::workers;
 use crate::plan::fingerprint::Fingerprint;
 use crate::run::finished::{InPlace, is_rest, results_in_place};
 use crate::run::part_entries::PartEntries;
-use crate::run::planned_job::{PlannedJob, planned};
+use crate::run::planned_job::{PlannedJob, is_planned};
 use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
 use std::collections::{BTreeMap, BTreeSet};
@@ -128,13 +128,9 @@ pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<Phas
         return publish_alone(options, tasks, is_rest(&directory)?);
     }
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    let known = planned(&directory, 0)?;
-    let is_same = known.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
-    // One process may have begun a small job, which has no tasks.
-    if is_same && PlannedJob::open(&directory, options, 0)?.is_some() {
-        missing_tasks_of_planned(options, tasks)
-    } else {
-        Ok(PhaseTasks::all(tasks, options.leaves_points_out()))
+    match is_planned(&directory, options, &fingerprint, 0)? {
+        true => missing_tasks_of_planned(options, tasks),
+        false => Ok(PhaseTasks::all(tasks, options.leaves_points_out())),
     }
 }
 

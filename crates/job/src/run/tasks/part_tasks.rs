@@ -43,7 +43,11 @@ pub(crate) fn work_on_parts(
     task: Task,
 ) -> Result<(u64, Option<String>)> {
     let directory = &JobDirectory::new(&options.output.directory);
-    let lock = share(directory, run.submission)?.ok_or_else(not_planned)?;
+    let has_journal = entries(directory.job())?.contains(&directory.journal());
+    if !has_journal && !single_process::is_noted(directory, run.submission)? {
+        return Err(not_planned());
+    }
+    let lock = Lock::share(directory.job())?;
     if !lock.is_real() {
         run.progress.note(NO_LOCKS);
     }
@@ -80,14 +84,6 @@ pub(crate) fn work_on_parts(
 fn parts_of(job: &PlannedJob, phase: Phase, task: Task) -> Vec<PartIndex> {
     let dealt = deal(&job.plan, &job.parts, phase, phase.tasks(task.count));
     dealt.into_iter().filter(|(_, number)| *number == task.number).map(|(part, _)| part).collect()
-}
-
-/// Shares the lock of the job directory; `None` if there is none.
-fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
-    let journal = directory.journal();
-    let is_there = entries(directory.job())?.contains(&journal);
-    let is_left = || single_process::is_noted(directory, submission);
-    if is_there || is_left()? { Lock::share(directory.job()).map(Some) } else { Ok(None) }
 }
 
 /// A task of a phase that is done by parts, or of join.

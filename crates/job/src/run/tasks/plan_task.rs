@@ -8,7 +8,6 @@ use crate::options::{JobOptions, RunOptions};
 use crate::partition::parts::Parts;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
-use crate::plan::job_plan::Plan;
 use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::contour_estimate::ContourSample;
 use crate::progress::clock::JobClock;
@@ -16,7 +15,7 @@ use crate::progress::stage::JobProgress;
 use crate::run::earlier_run::{EarlierRun, PlanOrigin, start};
 use crate::run::finished::known_submission;
 use crate::run::phases::plan_phase::{find_plan, note_skipped, write_plan};
-use crate::run::planned_job::planned;
+use crate::run::planned_job::is_planned;
 use crate::run::single_process;
 use std::time::SystemTime;
 use sys::threads::on_threads;
@@ -30,9 +29,12 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     let begun = SystemTime::now();
     check_nothing_in_the_way(directory)?;
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    if is_planned(directory, &fingerprint, run.submission)? {
+    // Nobody starts it over meanwhile.
+    let lock = if exists(&directory.journal())? { Some(Lock::share(directory.job())?) } else { None };
+    if lock.is_some() && is_planned(directory, options, &fingerprint, run.submission)? {
         return Ok(Some("the job is planned already".into()));
     }
+    drop(lock);
     check_results_are_ours(directory, options.output.page)?;
     let _lock = Lock::take(directory.job())?;
     let mut earlier = EarlierRun::read(directory, run)?;
@@ -59,9 +61,9 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     }
     single_process::remove_notes(directory)?;
     on_threads(threads, || {
-        let start = start(directory, &header, earlier, origin, false, run.progress)?;
+        let (journal, ..) = start(directory, &header, earlier, origin, false, run.progress)?;
         if origin != PlanOrigin::Kept {
-            write_plan(&start.journal, directory, plan)?;
+            write_plan(&journal, directory, plan)?;
         }
         Ok(None)
     })
@@ -72,15 +74,4 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
 fn modified_inputs(earlier: &EarlierRun, now: &Fingerprint) -> Option<String> {
     let is_same = now.since_planned(&earlier.header.fingerprint).is_none();
     now.modified_since(&earlier.header).filter(|_| is_same)
-}
-
-/// Tells whether the job with this fingerprint is planned. Nobody starts it over meanwhile.
-fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u64) -> crate::Result<bool> {
-    if !exists(&directory.journal())? {
-        return Ok(false);
-    }
-    let _lock = Lock::share(directory.job())?;
-    let known = planned(directory, submission)?;
-    let is_same = known.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
-    Ok(is_same && Parts::of(&Plan::read(&directory.plan())?).all().len() > 1)
 }
