@@ -112,10 +112,7 @@ impl EarlierRun {
         header: &JobHeader,
         progress: ProgressOutput,
     ) -> Option<Plan> {
-        let old = &self.header;
-        let is_update = old.coarsening == header.coarsening
-            && header.fingerprint.updates()
-            && header.fingerprint.may_update(&old.fingerprint);
+        let is_update = self.header.coarsening == header.coarsening && self.is_updated_by(&header.fingerprint);
         let first = is_update.then(|| first_plan(directory)).flatten();
         // A job of a single part, whose nodes above it have a journal too, is computed as a whole in any case.
         if is_update && self.mended.is_some() && first.is_none() && self.parts.len() > 2 {
@@ -159,10 +156,12 @@ impl EarlierRun {
 
     /// Returns how much coarser the lattice became, if the job with this fingerprint has the same mesh.
     pub(crate) fn coarsening(&self, fingerprint: &Fingerprint) -> Option<LatticeCoarsening> {
-        let old = &self.header.fingerprint;
-        let is_update = fingerprint.updates() && fingerprint.may_update(old);
-        let is_same = is_update || !matches!(fingerprint.since(old), JobChange::Mesh(_));
-        is_same.then_some(self.header.coarsening)
+        let is_changed = || matches!(fingerprint.since(&self.header.fingerprint), JobChange::Mesh(_));
+        (self.is_updated_by(fingerprint) || !is_changed()).then_some(self.header.coarsening)
+    }
+
+    fn is_updated_by(&self, fingerprint: &Fingerprint) -> bool {
+        fingerprint.updates() && fingerprint.may_update(&self.header.fingerprint)
     }
 
     /// Returns what has changed in the job with `header`; `None` if it has another lattice.

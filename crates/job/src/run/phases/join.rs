@@ -172,14 +172,20 @@ impl JoinedParts {
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a store.
     pub(crate) fn seam_of(&self, job: &Job, store: &Store, tree: &Tree, tile: TileIndex) -> Result<SeamOfTile> {
         let mut seam = seam_of(store, tree, FinishedTile { tile, last_merge: NodeIndex::ROOT })?;
-        let Some(joined) = &self.store else { return Ok(seam) };
+        self.add_seams(job, tile, &mut seam)?;
+        Ok(seam)
+    }
+
+    /// Adds what the seams above the parts have of `tile`.
+    fn add_seams(&self, job: &Job, tile: TileIndex, seam: &mut SeamOfTile) -> Result<()> {
+        let Some(joined) = &self.store else { return Ok(()) };
         let above = job.parts.tree.merges_above(job.parts.node(tile.part()));
         // A tile that is finished before all parts are merged has no seam above.
         for node in above.take_while(|node| joined.has(StepRecord::Seam(*node))) {
             seam.add(Seam::touching(joined, node, tile)?);
         }
         seam.sort();
-        Ok(seam)
+        Ok(())
     }
 
     /// Returns the key of `tile`: a hash of what the merges above the parts have of it, and of the rule for long triangles.
@@ -188,11 +194,7 @@ impl JoinedParts {
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store.
     pub(crate) fn key_of_tile(&self, job: &Job, tile: TileIndex) -> Result<u64> {
         let mut seam = SeamOfTile::default();
-        if let Some(joined) = &self.store {
-            let above = job.parts.tree.merges_above(job.parts.node(tile.part()));
-            above.into_iter().try_for_each(|node| Seam::touching(joined, node, tile).map(|found| seam.add(found)))?;
-        }
-        seam.sort();
+        self.add_seams(job, tile, &mut seam)?;
         let mut hasher = Xxh3::with_seed(self.key_of_rule);
         hasher.update(&seam.triangles.len().to_le_bytes());
         hasher.update(bytemuck::cast_slice(&seam.triangles));

@@ -39,11 +39,15 @@ pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<R
 /// # Errors
 /// [`Error::DamagedSteps`] if points are damaged, [`sys::Error::Io`] if what a reader wrote down cannot be read.
 pub(crate) fn points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPart<'a>> {
-    let points = listed_points_of(job, part)?;
-    if job.checks_points && !points.are_whole(&job.folder(part))? {
-        return Err(Error::DamagedSteps);
+    checked(job, part, listed_points_of(job, part)?)
+}
+
+/// Returns these points of `part`, unless they are damaged.
+pub(super) fn checked<'a>(job: &Job, part: PartIndex, points: PointsOfPart<'a>) -> Result<PointsOfPart<'a>> {
+    match job.checks_points && !points.are_whole(&job.folder(part))? {
+        true => Err(Error::DamagedSteps),
+        false => Ok(points),
     }
-    Ok(points)
 }
 
 /// As [`points_of`], whether the points are damaged or not.

@@ -1,6 +1,7 @@
 //! Finding the points that are vertices, in jobs with `surface = "bare-earth"` or `[output] max_error`. All parts are read before, and none is
 //! meshed.
 
+use crate::Result;
 use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::index::PartIndex;
 use crate::mesh::ground_record::{load_ground, save_ground};
@@ -12,8 +13,7 @@ use crate::plan::job_plan::Plan;
 use crate::records::{JobStep, StepRecord, Store};
 use crate::run::folder::{Folder, done_with};
 use crate::run::job::Job;
-use crate::run::phases::read_phase::{listed_points_of, points_of};
-use crate::{Error, Result};
+use crate::run::phases::read_phase::{checked, listed_points_of, points_of};
 use delaunay::geometry::Site;
 use ground::Ground;
 use selection::{Figures, Selection, select};
@@ -172,9 +172,5 @@ pub(crate) fn vertices_of<'a>(job: &Job<'a>, part: PartIndex, store: &Store) -> 
         return points_of(job, part);
     }
     let blocks = selected_part(job, part)?.blocks;
-    let points = PointsOfPart::none(job.plan, job.parts, part).selected(store, blocks)?;
-    if job.checks_points && !points.are_whole(&job.folder(part))? {
-        return Err(Error::DamagedSteps);
-    }
-    Ok(points)
+    checked(job, part, PointsOfPart::none(job.plan, job.parts, part).selected(store, blocks)?)
 }
