@@ -3,6 +3,7 @@
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::merge_records::{HullCount, Seam, SeamOfTile};
 use crate::mesh::merge::merge_frontiers;
+use crate::partition::result::Partition;
 use crate::partition::tree::{NodeKind, Tree};
 use crate::plan::budget::merge_memory;
 use crate::records::{FinishedBorder, JobStep, StepRecord, Store};
@@ -12,14 +13,18 @@ use crate::run::meshed_part::MeshedPart;
 use crate::run::phases::appearance::{SitesOfParts, count_sites, early_appearance, final_appearance};
 use crate::run::phases::read_phase::sum_up;
 use crate::tiles::appearance::TileAppearance;
+use crate::tiles::border_normals::finished_border;
 use crate::tiles::dependencies::FinishedTile;
 use crate::tiles::seam::seam_of;
 use serde::de::IgnoredAny;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use sys::Result;
 use tiles::options::MaxEdge;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+
+/// How many borders of other parts stay in memory, some ten kilobytes each.
+const MOST_KNOWN: usize = 1000;
 
 /// The merges above the parts, done.
 pub(crate) struct JoinedParts {
@@ -30,7 +35,7 @@ pub(crate) struct JoinedParts {
     /// The key of the rule for long triangles, with `--update`.
     key_of_rule: u64,
     /// Finished borders of tiles that tiles of other parts have asked for.
-    pub(super) borders: Mutex<HashMap<TileIndex, FinishedBorder>>,
+    borders: Mutex<HashMap<TileIndex, FinishedBorder>>,
 }
 
 /// Tells whether there is anything to do once all parts are meshed.
@@ -166,18 +171,39 @@ impl JoinedParts {
         Ok(JoinedParts { store, appearance, key_of_rule: 0, borders: Mutex::default() })
     }
 
-    /// Returns what all seams have of `tile` of the part with `store` and `tree`.
+    /// Returns the finished border of a tile of another part than that which is written. One that is not stored yet is computed: a part's folder
+    /// has one writer.
     ///
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a store.
-    pub(crate) fn seam_of(&self, job: &Job, store: &Store, tree: &Tree, tile: TileIndex) -> Result<SeamOfTile> {
-        let mut seam = seam_of(store, tree, FinishedTile { tile, last_merge: NodeIndex::ROOT })?;
-        self.add_seams(job, tile, &mut seam)?;
-        Ok(seam)
+    pub(crate) fn border_of(&self, job: &Job, tile: TileIndex) -> Result<FinishedBorder> {
+        let known = || self.borders.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(border) = known().get(&tile) {
+            return Ok(border.clone());
+        }
+        let OpenPart { store, partition: Partition { tree, .. }, .. } = &*job.open(tile.part())?;
+        // Another machine may be writing it. But what a written tile needed may be gone, and then it is whole.
+        let border = match store.has_whole(StepRecord::FinishedBorder(tile))? {
+            true => FinishedBorder::load(store, tile)?,
+            false => {
+                let mut seam = seam_of(store, tree, FinishedTile { tile, last_merge: NodeIndex::ROOT })?;
+                self.add_seams(job, tile, &mut seam)?;
+                finished_border(store, tree, &self.appearance.style, tile, &seam)?
+            }
+        };
+        let mut known = known();
+        if known.len() >= MOST_KNOWN {
+            known.clear();
+        }
+        known.insert(tile, border.clone());
+        Ok(border)
     }
 
     /// Adds what the seams above the parts have of `tile`.
-    fn add_seams(&self, job: &Job, tile: TileIndex, seam: &mut SeamOfTile) -> Result<()> {
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store.
+    pub(crate) fn add_seams(&self, job: &Job, tile: TileIndex, seam: &mut SeamOfTile) -> Result<()> {
         let Some(joined) = &self.store else { return Ok(()) };
         let above = job.parts.tree.merges_above(job.parts.node(tile.part()));
         // A tile that is finished before all parts are merged has no seam above.

@@ -2,16 +2,15 @@
 //! are merged, it is written, and what it needed is given back to the disk, unless the job keeps its mesh. So a job holds no more than its
 //! front.
 
-use crate::index::{NodeIndex, PartIndex, TileIndex};
-use crate::records::StepRecord;
+use crate::index::{PartIndex, TileIndex};
 use crate::run::job::Job;
 use crate::run::meshed_part::MeshedPart;
 use crate::run::phases::join::{JoinedParts, merge_through};
-use crate::run::phases::tile_phase::{BorderSession, TilesBefore, waiting_tiles};
+use crate::run::phases::tile_phase::{waiting_tiles, write_waiting};
+use crate::run::phases::tile_queue::TilesBefore;
 use crate::tiles::appearance::TileAppearance;
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
-use sys::Result;
 
 /// The tiles that wait for parts to come.
 pub(crate) struct WaitingTiles<'a> {
@@ -53,28 +52,13 @@ impl<'a> WaitingTiles<'a> {
         if due.peek().is_some() {
             let joined = JoinedParts::so_far(job, appearance.clone())?;
             for (&part, (tiles, meshed)) in due {
-                let session = BorderSession::open(job, &joined, part, tiles.len())?;
-                let before = session.store().bytes();
-                let some = session.write_ready(tiles, open)?;
-                if !meshed.is_kept {
-                    free_written(&session, &some.written, tiles.is_empty().then_some(&meshed.open))?;
-                }
-                *stored = (*stored + session.finish(some)?).saturating_sub(before);
+                let outer = (!meshed.is_kept).then_some(meshed.open.as_slice());
+                let (waiting, [before, after]) = write_waiting(job, &joined, part, open, outer)?;
+                *stored = (*stored + after).saturating_sub(before);
+                *tiles = waiting;
             }
         }
         self.waiting.retain(|_, (tiles, _)| !tiles.is_empty());
         Ok(())
     }
-}
-
-/// Gives up what `written` tiles needed. Once all tiles of a part are written, also what else no phase needs any more: all but the borders of
-/// its `outer` tiles, which other parts may still ask for.
-fn free_written(session: &BorderSession, written: &[TileIndex], outer: Option<&Vec<TileIndex>>) -> Result<()> {
-    let (store, partition) = (session.store(), session.partition());
-    let tree = &partition.tree;
-    written.iter().flat_map(|&tile| partition.records_of_leaf(tile)).try_for_each(|record| store.free(record))?;
-    let Some(outer) = outer else { return Ok(()) };
-    let inner = tree.tiles().filter(|tile| !outer.contains(tile));
-    inner.into_iter().try_for_each(|tile| store.free(StepRecord::FinishedBorder(tile)))?;
-    (1..tree.nodes.len()).map(NodeIndex::new).try_for_each(|node| store.free(StepRecord::Seam(node)))
 }
