@@ -17,7 +17,6 @@ pub(crate) mod select_phase;
 pub(crate) mod tile_phase;
 mod tile_queue;
 mod tree_walk;
-mod waiting_tiles;
 
 use crate::Result;
 use crate::index::PartIndex;
@@ -36,8 +35,7 @@ use crate::run::phases::plan_phase::settled;
 use crate::run::phases::publish_phase::publish_job;
 use crate::run::phases::read_phase::{read_for, sum_up};
 use crate::run::phases::select_phase::{select_vertices, selects};
-use crate::run::phases::tile_phase::finish_part;
-use crate::run::phases::waiting_tiles::WaitingTiles;
+use crate::run::phases::tile_phase::{WaitingTiles, finish_part};
 use crate::run::whole_run::WholeRun;
 use crate::tiles::write_tile::TileStats;
 
