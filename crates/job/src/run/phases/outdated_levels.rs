@@ -91,7 +91,7 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
 ///
 /// # Errors
 /// [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
-pub(crate) fn forget_outdated_levels(
+pub(super) fn forget_outdated_levels(
     job: &Job,
     part: PartIndex,
     hierarchy: &Hierarchy,

@@ -23,7 +23,7 @@ use crate::run::meshed_part::MeshedPart;
 use crate::run::part_entries::{Done, PartEntries};
 use crate::run::phases::join::JoinedParts;
 use crate::run::phases::level_phase::{hierarchy_of, levels_over};
-use crate::run::phases::outdated_levels::{forget_outdated_levels, level_sizes};
+use crate::run::phases::outdated_levels::level_sizes;
 use crate::run::phases::read_phase::sum_up;
 use crate::run::phases::select_phase::{SelectedPart, found_ground};
 use crate::run::update::changes::write_changes;
@@ -44,16 +44,16 @@ pub(crate) fn publish_job(run: &WholeRun, job: &Job, joined: &JoinedParts) -> cr
     let (summary, bounds) = sum_up(job)?;
     let above = Hierarchy::above_parts(&job.parts.tree, &points, level_sizes(plan));
     let has_tileset = wants_tileset(plan, &figures.tiles);
-    if !has_tileset && points.len() > 1 {
-        // A run before may have had one.
-        forget_outdated_levels(job, job.above(), &above, false)?;
+    let mut levels = figures.levels;
+    if !above.tiles.is_empty() {
+        let top_of = |part: PartIndex| {
+            let open = job.open(part)?;
+            Child::top(job.directory, &open.store, &open.partition.tree)
+        };
+        levels += levels_over(job, joined, job.above(), &above, has_tileset, &top_of)?;
     }
-    let tileset = has_tileset.then(|| levels_and_root(job, joined, &above)).transpose()?;
     add_stages(run, job)?;
-    let tileset = tileset.map(|(root, mut levels)| {
-        levels += figures.levels;
-        (root, levels)
-    });
+    let root = has_tileset.then(|| root_of_all(job, &above)).transpose()?;
     let written = WrittenTiles {
         stats: figures.tiles,
         bounds,
@@ -62,7 +62,7 @@ pub(crate) fn publish_job(run: &WholeRun, job: &Job, joined: &JoinedParts) -> cr
         appearance: &joined.appearance,
         tiles: &TilesOfParts(job),
     };
-    let mut published = publish(run, job, &written, tileset)?;
+    let mut published = publish(run, job, &written, root, levels)?;
     published.warnings.extend(plan.grown_parts_warning(&points));
     let of_parts = PartEntries::of_all(directory, job.id)?;
     let of_parts = of_parts.iter().flat_map(|part| part.files(None)).cloned();
@@ -151,22 +151,15 @@ fn figures_of(job: &Job) -> Result<(PartFigures, Vec<u64>)> {
     Ok((all, counts))
 }
 
-/// Makes the coarser tiles above the parts, those of `hierarchy`, and returns the root of all.
-fn levels_and_root(job: &Job, joined: &JoinedParts, hierarchy: &Hierarchy) -> crate::Result<(TilesetNode, LevelStats)> {
-    let (tree, mut levels) = (&job.parts.tree, LevelStats::default());
+/// Returns the root of all tiles. `hierarchy` has the coarser ones above the parts.
+fn root_of_all(job: &Job, hierarchy: &Hierarchy) -> Result<TilesetNode> {
     let root = if hierarchy.tiles.is_empty() {
         root_of_part(job, PartIndex::FIRST)?
     } else {
-        let top_of = |part: PartIndex| {
-            let open = job.open(part)?;
-            Child::top(job.directory, &open.store, &open.partition.tree)
-        };
-        levels = levels_over(job, joined, job.above(), hierarchy, true, &top_of)?;
         let (store, part_root) = (&job.entries(job.above())?.store()?, &|part: PartIndex| root_of_part(job, part));
-        TilesOfTree { store, tree, hierarchy, part_root }.root()?
+        TilesOfTree { store, tree: &job.parts.tree, hierarchy, part_root }.root()?
     };
-    let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
-    Ok((root, levels))
+    root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))
 }
 
 fn root_of_part(job: &Job, part: PartIndex) -> Result<Option<TilesetNode>> {
@@ -188,7 +181,7 @@ impl EachTile for TilesOfParts<'_> {
     }
 }
 
-/// Writes what is beside the tiles. The root of the tileset and the coarser tiles are there if viewers get 3D Tiles.
+/// Writes what is beside the tiles. The `root` of the tileset is there if viewers get 3D Tiles.
 ///
 /// # Errors
 /// Those of the functions in [`crate::publish`].
@@ -196,7 +189,8 @@ fn publish(
     run: &WholeRun,
     job: &Job,
     written: &WrittenTiles,
-    tileset: Option<(TilesetNode, LevelStats)>,
+    root: Option<TilesetNode>,
+    levels: LevelStats,
 ) -> Result<Published> {
     let (plan, directory, tiles) = (job.plan, job.directory, written.tiles);
     let style = &written.appearance.style;
@@ -245,9 +239,8 @@ fn publish(
         published.warnings.extend(classified.warnings);
         published.bytes += classified.bytes;
     }
-    let (root, levels) = tileset.unzip();
-    published.levels = levels.unwrap_or_default();
-    published.warnings.extend(levels.and_then(|levels| levels.left_out_warning(plan)));
+    published.levels = levels;
+    published.warnings.extend(levels.left_out_warning(plan));
     let content = written.side_files(plan, directory, root, &mut published.warnings)?;
     published.bytes += run.write(JobStep::Publish, ("publish", 1, "job"), |stage| {
         let files = write_side_files(directory, &content, &written.appearance.canvas, tiles)?;
