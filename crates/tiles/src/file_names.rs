@@ -91,6 +91,28 @@ impl OutputFiles {
         own.into_iter().chain(rasters).collect()
     }
 
+    /// Returns the files of which there is one at most, besides the page.
+    pub fn single_files(&self) -> Vec<PathBuf> {
+        let mut files = vec![
+            self.report(),
+            self.checksums(),
+            self.changes(),
+            self.terrain(),
+            self.tileset(),
+            self.georeference(),
+            self.breaklines(),
+            self.preview(),
+            self.preview_world(),
+            self.map_tiles(),
+            self.contours(),
+            self.contour_drawing(),
+            self.terrain_layer(),
+        ];
+        files.extend(PRODUCTS.into_iter().flat_map(|product| [self.raster(product), self.raster_list(product)]));
+        files.extend(ExportFormat::ALL.map(|format| self.export(format)));
+        files
+    }
+
     /// Returns the folder of the inputs with the classes that the job has found, and the ending of their names.
     pub fn classified(&self) -> (PathBuf, &'static str) {
         (self.directory.join(CLASSIFIED), LAZ)

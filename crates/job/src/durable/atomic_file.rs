@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::ScopedJoinHandle;
 use sys::disk::WriteFrom;
 use sys::{Error, Result, disk};
@@ -128,20 +129,15 @@ pub fn publish(paths: &[PathBuf]) -> Result<()> {
 
 /// Brings pending files to the disk on several threads: overlapping waits take little longer than one.
 fn sync_partial_files(paths: &[PathBuf]) -> Result<()> {
-    let share = paths.len().div_ceil(PARALLEL_SYNCS).max(1);
-    let sync = |paths: &[PathBuf]| paths.iter().try_for_each(|path| sync_file(&partial_path(path)));
+    let next = AtomicUsize::new(0);
+    let left = || paths.get(next.fetch_add(1, Ordering::Relaxed));
+    let sync = || std::iter::from_fn(left).try_for_each(|path| sync_file(&partial_path(path)));
     std::thread::scope(|scope| {
-        let mut shares = paths.chunks(share);
-        let own = shares.next().unwrap_or_default();
-        let start = |share| std::thread::Builder::new().spawn_scoped(scope, move || sync(share)).map_err(|_| share);
-        let others: Vec<_> = shares.map(start).collect();
-        let own = sync(own);
-        // If a thread could not be started, this one does its share.
-        let join = |other| match other {
-            Ok(thread) => ScopedJoinHandle::join(thread).unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
-            Err(share) => sync(share),
-        };
-        others.into_iter().map(join).fold(own, Result::and)
+        // If a thread cannot be started, the others do its share.
+        let start = |_| std::thread::Builder::new().spawn_scoped(scope, sync).ok();
+        let others: Vec<_> = (1..PARALLEL_SYNCS.min(paths.len())).filter_map(start).collect();
+        let join = |other: ScopedJoinHandle<_>| other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        others.into_iter().map(join).fold(sync(), Result::and)
     })
 }
 

@@ -19,18 +19,9 @@ pub(crate) fn unpack_group(packed: &[u8], width: u32, values: &mut [u32]) {
     unpack::<8>(packed, width, values);
 }
 
-/// Writes 32 values of `width` bits to `packed`, which has 4 bytes for each bit.
-pub(crate) fn pack_piece(values: &[u32], width: u32, packed: &mut [u8]) {
-    pack::<1>(values, width, packed);
-}
-
-/// Reads what [`pack_piece`] wrote. `width` is not zero.
-pub(crate) fn unpack_piece(packed: &[u8], width: u32, values: &mut [u32]) {
-    unpack::<1>(packed, width, values);
-}
-
+/// Writes values of `width` bits to `packed`, of which each lane has 32: 4 bytes for each bit.
 #[inline(always)]
-fn pack<const LANES: usize>(values: &[u32], width: u32, packed: &mut [u8]) {
+pub(crate) fn pack<const LANES: usize>(values: &[u32], width: u32, packed: &mut [u8]) {
     let (mut words, mut filled) = ([0; LANES], 0);
     let mut places = packed.chunks_exact_mut(4 * LANES);
     for row in values.as_chunks::<LANES>().0 {
@@ -45,8 +36,9 @@ fn pack<const LANES: usize>(values: &[u32], width: u32, packed: &mut [u8]) {
     }
 }
 
+/// Reads what [`pack`] wrote. `width` is not zero.
 #[inline(always)]
-fn unpack<const LANES: usize>(packed: &[u8], width: u32, values: &mut [u32]) {
+pub(crate) fn unpack<const LANES: usize>(packed: &[u8], width: u32, values: &mut [u32]) {
     let mask = u32::MAX >> (u32::BITS - width);
     let mut packed = packed.chunks_exact(4 * LANES).map(|bytes| {
         let bytes = bytes.as_chunks().0;

@@ -3,7 +3,7 @@
 use crate::durable::atomic_file::{remove_file, remove_tree};
 use crate::durable::listing::{Leftovers, entries, is_folder};
 use crate::durable::lock::lock_file;
-use crate::durable::replacement::Replacement;
+use crate::durable::replacement::replace;
 use crate::index::PartIndex;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -205,8 +205,7 @@ impl JobDirectory {
     /// [`sys::Error::Io`] if a file is missing, or cannot be renamed or removed.
     pub fn replace_results(&self, names: &HashSet<PathBuf>, keeps_waiting: bool) -> Result<()> {
         let on_the_way = keeps_waiting.then(|| self.on_the_way());
-        let replacement = Replacement::prepare(&self.results, &self.waiting, names, on_the_way)?;
-        replacement.map_or(Ok(()), |replacement| replacement.carry_out())
+        replace(&self.results, &self.waiting, names, on_the_way.as_deref())
     }
 
     /// Returns the paths of all results of an earlier job that may exist.

@@ -189,6 +189,14 @@ pub(crate) fn names_of_files(directory: &JobDirectory) -> Result<HashSet<PathBuf
     Ok(names)
 }
 
+/// Returns the names and checksums of the results among `files`, in the order of their names, with slashes on every system.
+pub(crate) fn listed(directory: &JobDirectory, mut files: Vec<PublishedFile>) -> Vec<(String, Checksum)> {
+    files.retain(|file| directory.is_result(&file.name));
+    files.sort_by(|a, b| a.name.cmp(&b.name));
+    let slashed = |name: &Path| name.iter().map(|part| part.to_string_lossy()).collect::<Vec<_>>().join("/");
+    files.into_iter().map(|file| (slashed(&file.name), file.checksum)).collect()
+}
+
 /// The journal of a run. Any thread may call its methods.
 pub struct Journal<S, K> {
     directory: JobDirectory,

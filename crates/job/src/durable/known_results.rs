@@ -31,22 +31,17 @@ impl KnownResults {
     pub(crate) fn of(folders: &[&OutputFiles]) -> Result<KnownResults> {
         let mut known = KnownResults::default();
         for folder in folders {
-            let changes = folder.changes();
-            let changes = if is_list_of_changes(&changes) { Some(changes) } else { None };
-            let own = [Some(folder.report()), Some(folder.checksums()), changes];
-            let names = own.iter().flatten().filter_map(|path| path.strip_prefix(folder.directory()).ok());
+            let changes = Some(folder.changes()).filter(|path| is_list_of_changes(path));
+            let own = [folder.report(), folder.checksums()].into_iter().chain(changes);
+            let own: Vec<PathBuf> = own.collect();
+            let names = own.iter().filter_map(|path| path.strip_prefix(folder.directory()).ok());
             known.names.extend(names.map(Path::to_path_buf));
-            known.add(&folder.checksums())?;
+            if let Some(files) = read_if_there(&folder.checksums())?.and_then(|text| parse_list(&text)) {
+                known.names.extend(files.into_iter().map(|(name, _)| PathBuf::from(name)));
+                known.has_list = true;
+            }
         }
         Ok(known)
-    }
-
-    fn add(&mut self, list: &Path) -> Result<()> {
-        if let Some(files) = read_if_there(list)?.and_then(|text| parse_list(&text)) {
-            self.names.extend(files.into_iter().map(|(name, _)| PathBuf::from(name)));
-            self.has_list = true;
-        }
-        Ok(())
     }
 
     /// Tells whether a job wrote the file with this name.

@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 use sys::{Error, Result, disk};
 use tiles::checksums::read_file;
 use tiles::file_names::{MOST_FOLDERS_DEEP, OutputFiles, belongs_into, is_number};
-use tiles::options::ExportFormat;
 use tiles::page::is_page;
-use tiles::raster::products::PRODUCTS;
 
 /// What a job may have left.
 #[derive(Default)]
@@ -31,23 +29,7 @@ impl Leftovers {
     /// # Errors
     /// [`Error::Io`] if a folder cannot be read.
     pub(crate) fn of(output: &OutputFiles) -> Result<Leftovers> {
-        let mut files = vec![
-            output.report(),
-            output.checksums(),
-            output.changes(),
-            output.terrain(),
-            output.tileset(),
-            output.georeference(),
-            output.breaklines(),
-            output.preview(),
-            output.preview_world(),
-            output.map_tiles(),
-            output.contours(),
-            output.contour_drawing(),
-            output.terrain_layer(),
-        ];
-        files.extend(PRODUCTS.into_iter().flat_map(|product| [output.raster(product), output.raster_list(product)]));
-        files.extend(ExportFormat::ALL.map(|format| output.export(format)));
+        let mut files = output.single_files();
         // People give their own pages this name too.
         if !is_page_of_others(output)? {
             files.push(output.page());

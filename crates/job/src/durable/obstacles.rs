@@ -24,13 +24,13 @@ pub fn check_nothing_in_the_way(directory: &JobDirectory) -> Result<()> {
     let [results, waiting] = [Leftovers::of(results)?, Leftovers::of(waiting)?];
     own.extend([results.no_folders, waiting.no_folders, results.folders].concat());
     let of_parts = parts.iter().flat_map(own_files);
-    let mut files = own_files(directory).into_iter().chain(of_parts).chain(results.files).chain(waiting.files);
-    let mut folders = output.ancestors().chain(own.iter().map(PathBuf::as_path));
+    let files = own_files(directory).into_iter().chain(of_parts).chain(results.files).chain(waiting.files);
+    let folders = output.ancestors().chain(own.iter().map(PathBuf::as_path));
     let is_in_the_way = |path: &Path| Ok(is_there(path)? && !is_folder(path)?);
-    let (found, what, wanted) = if let Some(found) = find(&mut folders, is_in_the_way)? {
+    let (found, what, wanted) = if let Some(found) = find(folders, is_in_the_way)? {
         let what = if exists(found)? { "is not a directory" } else { "is a broken link" };
         (found.to_path_buf(), what, "a directory")
-    } else if let Some(found) = find(&mut files, is_no_file)? {
+    } else if let Some(found) = find(files, is_no_file)? {
         let what = if is_folder(&found)? { "is a directory" } else { "is a pipe or a device" };
         (found, what, "a file")
     } else if let Some(found) = own.into_iter().find(|path| is_elsewhere(path, output)) {
@@ -122,15 +122,10 @@ fn is_there(path: &Path) -> Result<bool> {
 
 /// Returns the first of `paths` for which `holds`, if that can be told of all before it.
 fn find<P: AsRef<Path>>(
-    paths: &mut dyn Iterator<Item = P>,
+    paths: impl IntoIterator<Item = P>,
     holds: impl Fn(&Path) -> Result<bool>,
 ) -> Result<Option<P>> {
-    for path in paths {
-        if holds(path.as_ref())? {
-            return Ok(Some(path));
-        }
-    }
-    Ok(None)
+    paths.into_iter().map(|path| Ok(holds(path.as_ref())?.then_some(path))).find_map(Result::transpose).transpose()
 }
 
 /// Tells whether both folders exist, and on different disks.

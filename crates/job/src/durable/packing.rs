@@ -5,7 +5,7 @@
 //! difference to it, and the number of zero bits at the end of all differences, which are left out (colours are often 8 bits times
 //! 256). Full groups are laid out for vector instructions; the last one in pieces of 32, so that little is padded.
 
-use crate::durable::bits::{PIECE, pack_group, pack_piece, unpack_group, unpack_piece};
+use crate::durable::bits::{self, PIECE, pack_group, unpack_group};
 use multiversion::multiversion;
 
 /// Values of a full group.
@@ -71,7 +71,7 @@ fn pack_column(column: &mut Column, length: usize, bytes: &mut Vec<u8>) {
     }
     column[length..].fill(0);
     for (piece, packed) in column.chunks_exact(PIECE).zip(packed.chunks_exact_mut(packed_piece(width).max(1))) {
-        pack_piece(piece, width.into(), packed);
+        bits::pack::<1>(piece, width.into(), packed);
     }
 }
 
@@ -89,7 +89,7 @@ fn unpack_column<'a>(bytes: &'a [u8], length: usize, column: &mut Column) -> Opt
         _ if length == GROUP => unpack_group(packed, width.into(), column),
         _ => {
             for (packed, piece) in packed.chunks_exact(packed_piece(width)).zip(column.chunks_exact_mut(PIECE)) {
-                unpack_piece(packed, width.into(), piece);
+                bits::unpack::<1>(packed, width.into(), piece);
             }
         }
     }

@@ -15,126 +15,114 @@ use sys::{Error, Result, disk, fault};
 use tiles::checksums::Checksum;
 use tiles::file_names::OutputFiles;
 
-/// What is to be done to put the results of a job in place.
-pub(crate) struct Replacement {
-    /// The report of the earlier job, or the place of the new one.
-    report: PathBuf,
-    new_report: PathBuf,
-    /// The results that wait, and their places, besides the report and the list.
-    waiting: Vec<(PathBuf, PathBuf)>,
-    /// The list of all results, if it waits, and its place. That of the earlier job tells which files are outdated, so it stays until
-    /// these are gone.
-    list: Option<(PathBuf, PathBuf)>,
-    /// Results of the earlier job that this one does not have.
-    outdated: Vec<PathBuf>,
-    directory: OpenFolder,
-    /// The folders of numbered files, each after those in it. They can be opened, but they are too many to keep open.
-    numbered_folders: Vec<PathBuf>,
-    /// If the results stay where they wait, too, a path for what is on its way.
-    on_the_way: Option<PathBuf>,
+/// A file that waits, and its place.
+type Move = (PathBuf, PathBuf);
+
+/// Does what is to be done until the directory `results` holds the files with these `names` and no other results. Some of them are in `waiting`,
+/// and some may be in their places already. `on_the_way` is a path for what is on its way, if the results stay where they wait, too.
+///
+/// # Errors
+/// [`Error::Io`] if a file is in neither place, or the system does not tell; if a folder cannot be made or opened. [`Error::Config`]
+/// if a foreign file is in the place of a result. No result has been touched then. [`Error::Io`] if a file cannot be renamed or removed, or a
+/// folder cannot be synced.
+pub(crate) fn replace(
+    results: &OutputFiles,
+    waiting: &OutputFiles,
+    names: &HashSet<PathBuf>,
+    on_the_way: Option<&Path>,
+) -> Result<()> {
+    let [report, new_report] = [results, waiting].map(OutputFiles::report);
+    if !exists(&new_report)? && exists(&report)? {
+        // It goes last.
+        return Ok(());
+    }
+    if names.iter().any(|name| results.directory().join(name) == results.page()) {
+        // Somebody may have put it there since the job wrote its own. The lists of results name that one by now.
+        check_page_is_ours(results)?;
+    }
+    // The list that waits names every new result, also where a foreign file has come into its place. That of the earlier job stays
+    // until all others are in place.
+    let known = KnownResults::of(&[results])?;
+    let mut moves = moves(results, waiting, names, &known, on_the_way.is_some())?;
+    let outdated = outdated(results, names, &known, on_the_way.is_some())?;
+    if on_the_way.is_some() && moves.is_empty() && outdated.is_empty() {
+        return Ok(());
+    }
+    moves.retain(|(waits, _)| *waits != new_report);
+    // That of the earlier job tells which files are outdated, so it stays until these are gone.
+    let list = moves.iter().position(|(waits, _)| *waits == waiting.checksums()).map(|at| moves.remove(at));
+    let folders: HashSet<&Path> = moves.iter().filter_map(|(_, place)| place.parent()).collect();
+    folders.into_iter().try_for_each(create_folder)?;
+    // Each after those in it. They can be opened, but they are too many to keep open.
+    let numbered_folders = Leftovers::of(results)?.folders;
+    numbered_folders.iter().try_for_each(|path| open(path).map(|_| ()))?;
+    let directory = open(results.directory())?;
+    remove_file(&report)?;
+    sync(&directory)?;
+    moves.iter().try_for_each(|moved| put(moved, on_the_way))?;
+    outdated.iter().try_for_each(|path| remove_file(path))?;
+    for folder in &numbered_folders {
+        // This fails, as it should, where a folder holds files of this job or of somebody else.
+        if disk::remove_folder(folder).is_err() {
+            sync_folder(folder)?;
+        }
+    }
+    sync(&directory)?;
+    for moved in list.into_iter().chain([(new_report, report)]) {
+        put(&moved, on_the_way)?;
+        sync(&directory)?;
+    }
+    Ok(())
 }
 
-impl Replacement {
-    /// Finds out what is to be done until the directory `results` holds the files with these `names` and no other results. Some of them
-    /// are in `waiting`, and some may be in their places already. Returns `None` if all are.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if a file is in neither place, or the system does not tell; if a folder cannot be made or opened. [`Error::Config`]
-    /// if a foreign file is in the place of a result. No result has been touched then.
-    pub(crate) fn prepare(
-        results: &OutputFiles,
-        waiting: &OutputFiles,
-        names: &HashSet<PathBuf>,
-        on_the_way: Option<PathBuf>,
-    ) -> Result<Option<Replacement>> {
-        let [report, new_report] = [results, waiting].map(OutputFiles::report);
-        if !exists(&new_report)? && exists(&report)? {
-            // It goes last.
-            return Ok(None);
-        }
-        if names.iter().any(|name| results.directory().join(name) == results.page()) {
-            // Somebody may have put it there since the job wrote its own. The lists of results name that one by now.
-            check_page_is_ours(results)?;
-        }
-        // The list that waits names every new result, also where a foreign file has come into its place. That of the earlier job stays
-        // until all others are in place.
-        let (known, mut found) = (KnownResults::of(&[results])?, Vec::new());
-        // Neither what is done nor which file a message names may depend on the order of a hash set.
-        for name in names.iter().collect::<BTreeSet<_>>() {
-            let [place, waits] = [results, waiting].map(|folder| folder.directory().join(name));
-            if exists(&waits)? {
-                known.check_place(name, &waits, results)?;
-                if on_the_way.is_none() || !is_in_place(&waits, &place)? {
-                    found.push((waits, place));
-                }
-            } else if waits == new_report || !exists(&place)? {
-                let gone =
-                    io::Error::new(io::ErrorKind::NotFound, "it is gone, and it is not among the results either");
-                return Err(Error::io("read", &waits)(gone));
+/// Returns the results that wait for their places. If they `stay`, without those that are there already.
+fn moves(
+    results: &OutputFiles,
+    waiting: &OutputFiles,
+    names: &HashSet<PathBuf>,
+    known: &KnownResults,
+    stay: bool,
+) -> Result<Vec<Move>> {
+    let mut moves = Vec::new();
+    // Neither what is done nor which file a message names may depend on the order of a hash set.
+    for name in names.iter().collect::<BTreeSet<_>>() {
+        let [place, waits] = [results, waiting].map(|folder| folder.directory().join(name));
+        if exists(&waits)? {
+            known.check_place(name, &waits, results)?;
+            if !stay || !is_in_place(&waits, &place)? {
+                moves.push((waits, place));
             }
+        } else if waits == waiting.report() || !exists(&place)? {
+            let gone = io::Error::new(io::ErrorKind::NotFound, "it is gone, and it is not among the results either");
+            return Err(Error::io("read", &waits)(gone));
         }
-        let has_others = !found.is_empty();
-        found.retain(|(waits, _)| *waits != new_report);
-        let new_list = waiting.checksums();
-        let list = found.iter().position(|(waits, _)| *waits == new_list).map(|at| found.remove(at));
-        let mut outdated = Vec::new();
-        for path in Leftovers::of(results)?.files {
-            let name = path.strip_prefix(results.directory()).unwrap_or(&path);
-            // An update replaces the list of changes of the one before itself.
-            let stays = path == report || on_the_way.is_some() && path == results.changes();
-            // A file that no list names is foreign.
-            if !stays && !names.contains(name) && known.contains(name) && exists(&path)? {
-                outdated.push(path);
-            }
-        }
-        if on_the_way.is_some() && !has_others && outdated.is_empty() {
-            return Ok(None);
-        }
-        let folders: HashSet<&Path> = found.iter().filter_map(|(_, place)| place.parent()).collect();
-        folders.into_iter().try_for_each(create_folder)?;
-        let numbered_folders = Leftovers::of(results)?.folders;
-        numbered_folders.iter().try_for_each(|path| open(path).map(|_| ()))?;
-        let directory = open(results.directory())?;
-        let waiting = found;
-        Ok(Some(Replacement { report, new_report, waiting, list, outdated, directory, numbered_folders, on_the_way }))
     }
+    Ok(moves)
+}
 
-    fn put(&self, waits: &Path, place: &Path) -> Result<()> {
-        let put = match &self.on_the_way {
-            Some(partial) => disk::link(waits, place, partial),
-            None => disk::rename(waits, place),
-        };
-        put.map_err(Error::io("rename the finished file to", place))
+/// Returns the results of the earlier job that this one does not have.
+fn outdated(results: &OutputFiles, names: &HashSet<PathBuf>, known: &KnownResults, stay: bool) -> Result<Vec<PathBuf>> {
+    let mut outdated = Vec::new();
+    for path in Leftovers::of(results)?.files {
+        let name = path.strip_prefix(results.directory()).unwrap_or(&path);
+        // An update replaces the list of changes of the one before itself.
+        let stays = path == results.report() || stay && path == results.changes();
+        // A file that no list names is foreign.
+        if !stays && !names.contains(name) && known.contains(name) && exists(&path)? {
+            outdated.push(path);
+        }
     }
+    Ok(outdated)
+}
 
-    /// Does it. Every file is replaced at once, so there is no moment without one.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if a file cannot be renamed or removed, or a folder cannot be synced.
-    pub(crate) fn carry_out(&self) -> Result<()> {
-        remove_file(&self.report)?;
-        sync(&self.directory)?;
-        for (waits, place) in &self.waiting {
-            fault::point("replacing");
-            self.put(waits, place)?;
-        }
-        self.outdated.iter().try_for_each(|path| remove_file(path))?;
-        for folder in &self.numbered_folders {
-            // This fails, as it should, where a folder holds files of this job or of somebody else.
-            if disk::remove_folder(folder).is_err() {
-                sync_folder(folder)?;
-            }
-        }
-        sync(&self.directory)?;
-        if let Some((waits, place)) = &self.list {
-            fault::point("replacing");
-            self.put(waits, place)?;
-            sync(&self.directory)?;
-        }
-        fault::point("replacing");
-        self.put(&self.new_report, &self.report)?;
-        sync(&self.directory)
-    }
+/// Puts a file in its place. It is replaced at once, so there is no moment without one.
+fn put((waits, place): &Move, on_the_way: Option<&Path>) -> Result<()> {
+    fault::point("replacing");
+    let put = match on_the_way {
+        Some(partial) => disk::link(waits, place, partial),
+        None => disk::rename(waits, place),
+    };
+    put.map_err(Error::io("rename the finished file to", place))
 }
 
 /// Tells whether what waits is in its place already.

@@ -10,6 +10,7 @@ use crate::tiles::vertex_colors::ColorSource;
 use sys::Warnings;
 
 /// What step 8 has written.
+#[derive(Default)]
 pub(crate) struct Published {
     /// Bytes of the results besides the tiles.
     pub bytes: u64,

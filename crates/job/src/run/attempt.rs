@@ -3,7 +3,7 @@
 
 use crate::durable::cleaning::remove_job;
 use crate::durable::directory::JobDirectory;
-use crate::durable::listing::entries;
+use crate::durable::listing::{entries, exists};
 use crate::durable::lock::Lock;
 use crate::durable::obstacles::{check_nothing_in_the_way, check_results_are_ours};
 use crate::options::{JobOptions, RunOptions};
@@ -21,7 +21,7 @@ use crate::progress::stage::JobProgress;
 use crate::report::change_counts::ChangeCounts;
 use crate::report::job_report::Report;
 use crate::run::damage::{damaged_by_tasks, is_damage};
-use crate::run::earlier_run::{EarlierRun, PlanOrigin, RunStart, place_results_of_finished_job, start};
+use crate::run::earlier_run::{EarlierRun, PlanOrigin, place_results_of_finished_job, start};
 use crate::run::finished::{InPlace, known_submission, replaced_terrain, results_in_place};
 use crate::run::job::Process;
 use crate::run::part_entries::PartEntries;
@@ -32,7 +32,7 @@ use crate::run::update::mending::Mended;
 use crate::run::whole_run::WholeRun;
 use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
-use std::sync::Mutex;
+use std::cell::RefCell;
 use sys::ErrorKind;
 use sys::threads::on_threads;
 
@@ -72,11 +72,13 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
     if !entries(directory.job())?.is_empty() {
         // Before anything else can fail: an earlier run may have been cut off while its results took their places.
         lock = Some(Lock::take(directory.job())?);
-        earlier = read_earlier(&directory, run)?;
-        if earlier.is_none() && options.updates && has_first_plan(&directory)? {
+        earlier = EarlierRun::read(&directory, run)?;
+        let has_journal = exists(&directory.journal())?;
+        if !has_journal && options.updates && has_first_plan(&directory)? {
             let path = directory.journal();
             run.progress.note(&format!("{} is missing: everything is computed again", path.display()));
-        } else if let (None, false) = (&earlier, run.restart)
+        } else if !has_journal
+            && !run.restart
             && let InPlace::ThisJob(report) = results_in_place(&directory, options, run.submission)?
         {
             run.progress.note("the interrupted run had put all its results in place");
@@ -84,8 +86,7 @@ pub(crate) fn run_until_it_fits(options: &JobOptions, run: RunOptions, is_by_tas
             return Ok(*report);
         }
     }
-    let known = earlier.as_ref().map_or(0, |earlier| earlier.submission);
-    let submission = known.max(run.submission).max(known_submission(&directory)?);
+    let submission = run.submission.max(known_submission(&directory)?);
     // Before the inputs, so that a job that must have a GPU fails at once if there is none.
     let memory = options.limits.memory.0;
     let triangulator = match is_by_tasks {
@@ -155,21 +156,6 @@ pub(crate) fn may_coarsen(options: &JobOptions, vertical: bool) -> bool {
     set.step().is_none()
 }
 
-/// Reads what an earlier run left, unless the job is to start over. If it left all its results, they take their places in any case:
-/// it may have been cut off among them.
-pub(crate) fn read_earlier(directory: &JobDirectory, run: RunOptions) -> sys::Result<Option<EarlierRun>> {
-    let mut earlier = EarlierRun::read(directory)?;
-    if let Some(earlier) = earlier.as_mut() {
-        earlier.place_whole_results(directory, run.progress)?;
-        if run.restart || earlier.submission < run.submission {
-            earlier.forget();
-        } else if !earlier.is_readable() {
-            run.progress.note("the journal of the earlier run is damaged or of another version; starting over");
-        }
-    }
-    Ok(earlier)
-}
-
 fn attempt(
     job: &JobRequest,
     coarsening: LatticeCoarsening,
@@ -203,7 +189,7 @@ fn attempt(
         None => {
             let lock = Lock::take(directory.job())?;
             // Another process may have begun the job, and stopped, since this one looked.
-            earlier = read_earlier(directory, run)?;
+            earlier = EarlierRun::read(directory, run)?;
             lock
         }
     };
@@ -211,7 +197,7 @@ fn attempt(
         progress.note(NO_LOCKS);
     }
     // Tasks have worked since the plan, and this process only ends it.
-    let begun = earlier.as_ref().filter(|_| is_by_tasks).and_then(|earlier| earlier.begun());
+    let begun = earlier.as_ref().filter(|_| is_by_tasks).and_then(|earlier| earlier.header.begun);
     let complete = earlier.as_ref().map(|earlier| earlier.complete_report(directory, &header)).transpose()?;
     if let Some(report) = complete.flatten() {
         if options.updates {
@@ -236,7 +222,7 @@ fn attempt(
     job.triangulator.prepare(plan.records, threads);
     let keeps_mesh = plan.keeps_mesh();
     on_threads(threads, || {
-        let RunStart { journal, job_id, resumed } =
+        let (journal, JobHeader { id, .. }, resumed) =
             start(directory, &header, earlier, origin, is_by_tasks, run.progress)?;
         // That tasks or an earlier run have done phases is nothing to tell.
         let told = if is_by_tasks || is_update { 0 } else { resumed };
@@ -246,7 +232,7 @@ fn attempt(
             progress,
             threads,
             clock,
-            id: job_id,
+            id,
             checks_points: told > 0 || options.updates,
             is_task: false,
         };
@@ -256,7 +242,7 @@ fn attempt(
             begun,
             identity: job.fingerprint.identity(options, job.submission)?,
             resumed: told,
-            stages: Mutex::new(vec![planned]),
+            stages: RefCell::new(vec![planned]),
         };
         // What tasks left was not compared with its hashes, and a disk may fail meanwhile.
         let outcome = do_phases(&whole_run, plan).map_err(|error| match error {
@@ -265,7 +251,7 @@ fn attempt(
         });
         // If the journals cannot be read now, something may be kept.
         let count = |parts: Vec<PartEntries>| parts.iter().map(|part| part.entries.len() as u64).sum();
-        let of_parts = || PartEntries::of_all(directory, job_id).map_or(1, count);
+        let of_parts = || PartEntries::of_all(directory, id).map_or(1, count);
         let phases = journal.complete() + if outcome.is_err() { of_parts() } else { 0 };
         drop(journal);
         job.end(outcome, phases, keeps_mesh, is_update)

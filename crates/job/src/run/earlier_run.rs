@@ -8,7 +8,7 @@ use crate::durable::directory::JobDirectory;
 use crate::durable::journal;
 use crate::durable::journal::PublishedFile;
 use crate::durable::listing::read_if_there;
-use crate::options::JobOptions;
+use crate::options::{JobOptions, RunOptions};
 use crate::plan::fingerprint::{Fingerprint, JobChange, JobHeader, PLAN_AGAIN, first_few};
 use crate::plan::first_plan_file::first_plan;
 use crate::plan::job_plan::Plan;
@@ -32,12 +32,9 @@ use tiles::file_names::OutputFiles;
 
 /// An earlier run of a job in the same directory, as its journals tell.
 pub(crate) struct EarlierRun {
-    /// `None` if another version of the program wrote the journal, or it is damaged.
-    pub(super) header: Option<JobHeader>,
+    pub(super) header: JobHeader,
     entries: Vec<JournalEntry>,
     parts: Vec<PartEntries>,
-    /// The submission that started the job over; 0 if none did.
-    pub(crate) submission: u64,
     /// Whether all its results are in place.
     is_complete: bool,
     /// If it had `--update` and wrote all its results, what became of them since.
@@ -61,26 +58,29 @@ pub(crate) enum PlanOrigin {
 const STYLED: [JobStep; 4] = [JobStep::Tiles, JobStep::LevelTiles, JobStep::Levels, JobStep::Join];
 
 impl EarlierRun {
-    /// Reads the journals in the job directory, if there are some.
+    /// Reads what an earlier run left in the job directory, unless the job is to start over. If it left all its results, they take their places
+    /// in any case: it may have been cut off among them.
     ///
     /// # Errors
-    /// [`Error::Io`] if one cannot be read.
-    pub(crate) fn read(directory: &JobDirectory) -> Result<Option<EarlierRun>> {
+    /// [`Error::Io`] if a journal cannot be read, and as [`JobDirectory::replace_results`].
+    pub(crate) fn read(directory: &JobDirectory, run: RunOptions) -> Result<Option<EarlierRun>> {
         let Some((header, entries, _)) = journal::read::<JobHeader, JournalEntry>(directory)? else { return Ok(None) };
-        let parts = header.as_ref().map(|header| PartEntries::of_all(directory, header.id)).transpose()?;
-        let (submission, parts) = (header.as_ref().map_or(0, |header| header.submission), parts.unwrap_or_default());
-        let (is_complete, mended, has_dropped) = (false, None, false);
-        Ok(Some(EarlierRun { header, entries, parts, submission, is_complete, mended, has_dropped }))
+        let Some(header) = header else {
+            run.progress.note("the journal of the earlier run is damaged or of another version; starting over");
+            return Ok(None);
+        };
+        let parts = PartEntries::of_all(directory, header.id)?;
+        let mut earlier = EarlierRun { header, entries, parts, is_complete: false, mended: None, has_dropped: false };
+        earlier.place_whole_results(directory, run.progress)?;
+        let starts_over = run.restart || earlier.header.submission < run.submission;
+        Ok((!starts_over).then_some(earlier))
     }
 
     /// Puts the results in place if the run had written them all. From then on they are what the output directory holds, whatever
     /// this run does. Those of an update are mended before that.
-    ///
-    /// # Errors
-    /// As [`JobDirectory::replace_results`].
-    pub(crate) fn place_whole_results(&mut self, directory: &JobDirectory, progress: ProgressOutput) -> Result<()> {
+    fn place_whole_results(&mut self, directory: &JobDirectory, progress: ProgressOutput) -> Result<()> {
         let has_report = self.entries.iter().any(|entry| entry.step == JobStep::Report);
-        let updates = self.header.as_ref().is_some_and(|header| header.fingerprint.updates());
+        let updates = self.header.fingerprint.updates();
         if has_report && updates {
             let mended = Mended::of(directory, self.results(directory).cloned().collect())?;
             mended.tell(progress);
@@ -112,8 +112,7 @@ impl EarlierRun {
         header: &JobHeader,
         progress: ProgressOutput,
     ) -> Option<Plan> {
-        let old = self.header.as_ref().filter(|old| old.coarsening == header.coarsening)?;
-        let is_update = header.fingerprint.updates() && header.fingerprint.may_update(&old.fingerprint);
+        let is_update = self.header.coarsening == header.coarsening && self.is_updated_by(&header.fingerprint);
         let first = is_update.then(|| first_plan(directory)).flatten();
         // A job of a single part, whose nodes above it have a journal too, is computed as a whole in any case.
         if is_update && self.mended.is_some() && first.is_none() && self.parts.len() > 2 {
@@ -135,7 +134,7 @@ impl EarlierRun {
     /// # Errors
     /// [`Error::Config`] if the job has changed since.
     pub(crate) fn as_planned(&self, now: Fingerprint) -> Result<(Fingerprint, Option<String>)> {
-        let Some(planned) = &self.header else { return Ok((now, None)) };
+        let planned = &self.header;
         if let Some(what) = now.since_planned(&planned.fingerprint) {
             return Err(Error::Config(format!("{what}: changed since the job was planned; {PLAN_AGAIN}")));
         }
@@ -155,43 +154,25 @@ impl EarlierRun {
         Ok((now.with_names_of(&planned.fingerprint), warning))
     }
 
-    /// Tells whether its journal can be read.
-    pub(crate) fn is_readable(&self) -> bool {
-        self.header.is_some()
-    }
-
-    /// Returns when the job was begun.
-    pub(crate) fn begun(&self) -> Option<SystemTime> {
-        self.header.as_ref().and_then(|header| header.begun)
-    }
-
-    /// Forgets all phases, so that the job starts over.
-    pub(crate) fn forget(&mut self) {
-        self.header = None;
-        self.entries.clear();
-        self.parts.clear();
-        self.is_complete = false;
-        self.mended = None;
-    }
-
     /// Returns how much coarser the lattice became, if the job with this fingerprint has the same mesh.
     pub(crate) fn coarsening(&self, fingerprint: &Fingerprint) -> Option<LatticeCoarsening> {
-        let header = self.header.as_ref()?;
-        let is_update = fingerprint.updates() && fingerprint.may_update(&header.fingerprint);
-        let is_same = is_update || !matches!(fingerprint.since(&header.fingerprint), JobChange::Mesh(_));
-        is_same.then_some(header.coarsening)
+        let is_changed = || matches!(fingerprint.since(&self.header.fingerprint), JobChange::Mesh(_));
+        (self.is_updated_by(fingerprint) || !is_changed()).then_some(self.header.coarsening)
+    }
+
+    fn is_updated_by(&self, fingerprint: &Fingerprint) -> bool {
+        fingerprint.updates() && fingerprint.may_update(&self.header.fingerprint)
     }
 
     /// Returns what has changed in the job with `header`; `None` if it has another lattice.
     fn change(&self, header: &JobHeader) -> Option<JobChange> {
-        let old = self.header.as_ref().filter(|old| old.coarsening == header.coarsening)?;
-        Some(header.fingerprint.since(&old.fingerprint))
+        (self.header.coarsening == header.coarsening).then(|| header.fingerprint.since(&self.header.fingerprint))
     }
 
     /// Returns the plan that the run wrote, with the present `options`, if it is whole and that of the job with `header`. Another style may
     /// bend the scene otherwise.
     pub(crate) fn plan(&self, directory: &JobDirectory, header: &JobHeader, options: &JobOptions) -> Option<Plan> {
-        let (old, entry) = (self.header.as_ref()?, self.entries.iter().find(|entry| entry.step == JobStep::Plan)?);
+        let entry = self.entries.iter().find(|entry| entry.step == JobStep::Plan)?;
         let is_same = match self.change(header)? {
             // What is updated takes a plan of its own.
             JobChange::Nothing => self.mended.is_none() || !header.fingerprint.updates() || self.is_complete,
@@ -203,7 +184,7 @@ impl EarlierRun {
         }
         let mut plan = Plan::read(&directory.plan()).ok()?;
         plan.options = options.clone();
-        plan.rename_inputs(&header.fingerprint.renamed_inputs(&old.fingerprint));
+        plan.rename_inputs(&header.fingerprint.renamed_inputs(&self.header.fingerprint));
         Some(plan)
     }
 
@@ -234,19 +215,18 @@ impl EarlierRun {
 
     /// Returns which steps an update to the job with `header` does again in any case. The key of each phase tells the rest.
     fn outdated_by_update(&self, header: &JobHeader, progress: ProgressOutput) -> Vec<JobStep> {
-        let old = self.header.as_ref().map(|old| &old.fingerprint);
-        let inputs = old.map(|old| header.fingerprint.inputs_since(old)).unwrap_or_default();
+        let inputs = header.fingerprint.inputs_since(&self.header.fingerprint);
         if !inputs.is_empty() {
             progress.note(&format!("changed since the last run: {}", first_few(inputs)));
         }
-        let Some(what) = old.and_then(|old| header.fingerprint.style_since(old)) else { return Vec::new() };
+        let Some(what) = header.fingerprint.style_since(&self.header.fingerprint) else { return Vec::new() };
         progress.note(&format!("changed since the last run: {what}; all tiles are written again"));
         STYLED.to_vec()
     }
 
     /// Returns which steps do not hold for the job with `header`, or `None` if it starts over.
     fn outdated_for(&self, header: &JobHeader, origin: PlanOrigin, progress: ProgressOutput) -> Option<Vec<JobStep>> {
-        let (old, change, has_plan) = (self.header.as_ref()?, self.change(header)?, origin == PlanOrigin::Kept);
+        let (old, change, has_plan) = (&self.header, self.change(header)?, origin == PlanOrigin::Kept);
         if header.fingerprint.updates() && !has_plan {
             if let (true, JobChange::Mesh(what)) = (old.fingerprint.updates(), &change) {
                 progress.note(&format!("changed since the last run: {what}; everything is computed again"));
@@ -342,19 +322,10 @@ pub(crate) fn place_results_of_finished_job(directory: &JobDirectory, updates: b
     place_changes(directory)
 }
 
-/// Where a run begins.
-pub(crate) struct RunStart {
-    /// Which phases of the whole job are complete.
-    pub(crate) journal: Journal,
-    /// Tells the folders of this job's parts from those of others.
-    pub(crate) job_id: u64,
-    /// The number of phases that are complete.
-    pub(crate) resumed: u64,
-}
-
 /// Begins a run of the job with `header` in its locked directory: takes over what is the same from the earlier run if it is whole, and
 /// otherwise removes everything. `origin` tells whose its plan is. What tasks have done is not compared with its hashes
-/// (`is_by_tasks`), because it was on the disk before others counted on it.
+/// (`is_by_tasks`), because it was on the disk before others counted on it. Returns the journal of the job with its header, and the number of
+/// phases that are complete.
 ///
 /// # Errors
 /// [`Error::Io`] on the job directory.
@@ -365,7 +336,7 @@ pub(crate) fn start(
     origin: PlanOrigin,
     is_by_tasks: bool,
     progress: ProgressOutput,
-) -> Result<RunStart> {
+) -> Result<(Journal, JobHeader, u64)> {
     let (is_update, has_plan) = (origin == PlanOrigin::Update, origin == PlanOrigin::Kept);
     let progress_of_tasks = if is_by_tasks { ProgressOutput::Quiet } else { progress };
     let mut kept = earlier.and_then(|earlier| earlier.kept_for(header, origin, progress_of_tasks));
@@ -381,13 +352,13 @@ pub(crate) fn start(
             kept = None;
         }
     }
-    let Some(EarlierRun { header: Some(old), entries, parts, has_dropped, .. }) = kept else {
+    let Some(EarlierRun { header: old, entries, parts, has_dropped, .. }) = kept else {
         remove_file(&directory.journal())?;
         directory.clear(&single_process::notes(directory)?)?;
         let begun = header.begun.or(Some(SystemTime::now()));
         let header = JobHeader { id: new_id(), begun, ..header.clone() };
         let journal = Journal::begin(directory, &header, Vec::new())?;
-        return Ok(RunStart { journal, job_id: header.id, resumed: 0 });
+        return Ok((journal, header, 0));
     };
     let resumed = (entries.len() + parts.iter().map(|part| part.entries.len()).sum::<usize>()) as u64;
     if is_update {
@@ -405,7 +376,7 @@ pub(crate) fn start(
         drop(Journal::begin(&directory, &header, entries)?);
     }
     let header = JobHeader { fingerprint, id: old.id, begun: old.begun, ..*header };
-    Ok(RunStart { journal: Journal::begin(directory, &header, entries)?, job_id: header.id, resumed })
+    Ok((Journal::begin(directory, &header, entries)?, header, resumed))
 }
 
 /// Returns a number that no other run has.

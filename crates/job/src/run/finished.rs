@@ -14,6 +14,7 @@ use crate::records::{JobStep, JournalEntry};
 use crate::report::job_report::Report;
 use crate::run::planned_job::planned;
 use crate::run::single_process;
+use serde::de::IgnoredAny;
 use std::io::ErrorKind;
 use sys::terminal::name;
 use sys::threads::on_threads;
@@ -95,16 +96,17 @@ fn are_inputs_gone(why: &Error) -> bool {
     }
 }
 
-/// Returns the latest submission that a note or a report in place tells of; 0 without one. What is done after it keeps its number, so that its
-/// late tasks find that the job is done.
+/// Returns the latest submission that the journal, a note or a report in place tells of; 0 without one. What is done after it keeps its number,
+/// so that its late tasks find that the job is done.
 ///
 /// # Errors
 /// [`Error::Io`] if the job directory or the report cannot be read.
 pub(crate) fn known_submission(directory: &JobDirectory) -> Result<u64> {
     let text = read_if_there(&directory.results().report())?;
     let report = text.and_then(|text| serde_json::from_slice::<Report>(&text).ok());
-    let of_report = report.map_or(0, |report| report.submission);
-    Ok(of_report.max(single_process::submission(directory)?))
+    let header = journal::read::<JobHeader, IgnoredAny>(directory)?.and_then(|(header, ..)| header);
+    let known = [report.map_or(0, |report| report.submission), header.map_or(0, |header| header.submission)];
+    Ok(known.into_iter().fold(single_process::submission(directory)?, u64::max))
 }
 
 /// Tells whether the job directory holds nothing but the rest of a finished job: neither a note nor the journal of a job that has not

@@ -9,7 +9,6 @@ use crate::progress::stats::StageStats;
 use crate::records::{JobStep, Journal, JournalEntry, Store};
 use crate::run::job::Job;
 use crate::run::part_entries::Done;
-use crate::run::update::outdated::forget_from;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::sync::{Mutex, PoisonError};
@@ -65,7 +64,7 @@ pub(crate) fn done_with<T: DeserializeOwned>(
     key: u64,
 ) -> crate::Result<Option<Done<T>>> {
     match job.entries(part)?.done(step)? {
-        Some(Done { key: other, .. }) if other != key => forget_from(job, part, step).map(|()| None),
+        Some(Done { key: other, .. }) if other != key => job.forget_from(part, step).map(|()| None),
         done => Ok(done),
     }
 }

@@ -4,6 +4,7 @@ use crate::durable::atomic_file::remove_file;
 use crate::durable::directory::JobDirectory;
 use crate::durable::lock::Lock;
 use crate::index::PartIndex;
+use crate::partition::part_points::ReadInputs;
 use crate::partition::parts::Parts;
 use crate::partition::result::Partition;
 use crate::plan::job_plan::Plan;
@@ -117,6 +118,30 @@ impl<'a> Job<'a> {
         Ok(before.difference(&after).try_for_each(|name| remove_file(&directory.file(name)))?)
     }
 
+    /// Takes `step` out of the journal of `part`, or of the nodes above the parts, and the phases of the same folder that follow from it, with the
+    /// files that they left.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
+    pub(crate) fn forget_from(&self, part: PartIndex, step: JobStep) -> crate::Result<()> {
+        let entries = self.entries(part)?;
+        self.rewrite(part, |entry| Ok((!follows(entry.step, step)).then_some(entry)))?;
+        if step == JobStep::Read {
+            let read = entries.figures::<ReadInputs>(step)?;
+            let files = read.by_part.iter().map(|found| self.directory.part(found.part).point_file(part.0 as u16));
+            files.into_iter().try_for_each(|file| remove_file(&file))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the key of a phase: 0 without `--update`.
+    ///
+    /// # Errors
+    /// Those of `key`.
+    pub(crate) fn key<E>(&self, key: impl FnOnce() -> std::result::Result<u64, E>) -> std::result::Result<u64, E> {
+        if self.plan.options.updates { key() } else { Ok(0) }
+    }
+
     /// Opens the store of `part`, which must be meshed.
     ///
     /// # Errors
@@ -131,7 +156,7 @@ impl<'a> Job<'a> {
             return Err(sys::Error::Broken(format!("part {part} is not meshed")));
         }
         let store = Arc::new(entries.store()?);
-        let tiles = SomeTiles::of(&entries)?;
+        let tiles = entries.tiles()?;
         let opened = Arc::new(OpenPart { partition: Partition::load(&store)?, tiles, store });
         open.push_back((part, opened.clone()));
         if open.len() > KEPT_OPEN {
@@ -153,5 +178,14 @@ impl<'a> Job<'a> {
     /// soon, but tasks on other machines may go on with a larger one at any time.
     pub(crate) fn syncs(&self) -> bool {
         self.parts.all().len() > 1 || self.clock.wall_s() > WORTH_SYNCING || fault::syncs_always()
+    }
+}
+
+/// Tells whether `step` is `changed`, or follows from it in the same folder.
+fn follows(step: JobStep, changed: JobStep) -> bool {
+    match changed {
+        JobStep::Mesh => matches!(step, JobStep::Mesh | JobStep::Tiles | JobStep::LevelTiles | JobStep::Levels),
+        JobStep::Join => matches!(step, JobStep::Merge(_) | JobStep::Join),
+        _ => step == changed,
     }
 }

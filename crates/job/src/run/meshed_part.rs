@@ -2,11 +2,8 @@
 
 use crate::index::TileIndex;
 use crate::mesh::leaf::LeafStats;
-use crate::records::JobStep;
-use crate::run::part_entries::PartEntries;
 use crate::tiles::write_tile::TileStats;
 use serde::{Deserialize, Serialize};
-use sys::Result;
 
 /// What is known of a part once it is meshed.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -52,16 +49,6 @@ pub(crate) struct WaitedTile {
 }
 
 impl SomeTiles {
-    /// Returns what is written of the tiles of a part with these `entries`.
-    ///
-    /// # Errors
-    /// [`sys::Error::Broken`] if they are not understood.
-    pub(crate) fn of(entries: &PartEntries) -> Result<SomeTiles> {
-        let mut all = SomeTiles::default();
-        entries.all_figures(JobStep::Tiles)?.into_iter().for_each(|some| all.add(some));
-        Ok(all)
-    }
-
     /// Adds tiles that were written later.
     pub(crate) fn add(&mut self, later: SomeTiles) {
         self.stats += later.stats;

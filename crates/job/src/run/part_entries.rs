@@ -5,10 +5,12 @@ use crate::durable::journal;
 use crate::durable::journal::{PublishedFile, records_of};
 use crate::index::PartIndex;
 use crate::partition::parts::Parts;
+use crate::phase::Phase;
 use crate::progress::stats::StageStats;
-use crate::records::{JobStep, JournalEntry, Store};
+use crate::records::{JobStep, JournalEntry, RecordRef, Store};
+use crate::run::meshed_part::{MeshedPart, SomeTiles};
 use rayon::prelude::*;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 use sys::{Error, Result, interrupt};
 
@@ -114,6 +116,62 @@ impl PartEntries {
     pub(crate) fn all_figures<T: DeserializeOwned>(&self, step: JobStep) -> Result<Vec<T>> {
         let entries = self.entries.iter().filter(|entry| entry.step == step);
         entries.map(|entry| entry.figures().map(|done: Done<T>| done.figures)).collect()
+    }
+
+    /// Returns what is written of the tiles of the part.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if it is not understood.
+    pub(crate) fn tiles(&self) -> Result<SomeTiles> {
+        let mut all = SomeTiles::default();
+        self.all_figures(JobStep::Tiles)?.into_iter().for_each(|some| all.add(some));
+        Ok(all)
+    }
+
+    /// Returns how many of its tiles are not written yet; `None` if it is not meshed.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if the entries are not understood.
+    pub(crate) fn tiles_left(&self) -> Result<Option<usize>> {
+        let mesh = self.known::<MeshedPart>(JobStep::Mesh)?;
+        mesh.map(|mesh| Ok(mesh.tiles.saturating_sub(self.tiles()?.written.len()))).transpose()
+    }
+
+    /// Tells whether `phase` is complete, as far as it is about this part, or these nodes.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if the entries are not understood.
+    pub(crate) fn has_phase(&self, phase: Phase) -> Result<bool> {
+        Ok(match phase {
+            Phase::Read => self.has(JobStep::Read),
+            Phase::Select => self.has(JobStep::Select),
+            Phase::Mesh => self.has(JobStep::Mesh),
+            Phase::Join => self.has(JobStep::Join),
+            Phase::Tiles => self.tiles_left()? == Some(0),
+            Phase::Levels => self.has(JobStep::Levels),
+            Phase::Plan | Phase::Publish => false,
+        })
+    }
+
+    /// Returns what each phase took.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if that is not understood.
+    pub(crate) fn costs(&self) -> Result<Vec<(JobStep, Done<IgnoredAny>)>> {
+        self.entries.iter().map(|entry| Ok((entry.step, entry.figures()?))).collect()
+    }
+
+    /// Returns how long the phases took together that are about this part alone.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if that is not understood.
+    pub(crate) fn seconds(&self) -> Result<f64> {
+        Ok(self.costs()?.iter().filter(|(step, _)| *step != JobStep::Select).map(|(_, done)| done.seconds).sum())
+    }
+
+    /// Returns the bytes that the store keeps.
+    pub(crate) fn stored(&self) -> u64 {
+        records_of(&self.entries).values().map(RecordRef::bytes).sum()
     }
 
     /// Returns the results of all phases, or of `step` alone.

@@ -6,7 +6,7 @@ use crate::durable::listing::entries;
 use crate::index::PartIndex;
 use crate::options::JobOptions;
 use crate::partition::parts::Parts;
-use crate::plan::fingerprint::{JobHeader, PLAN_AGAIN};
+use crate::plan::fingerprint::{Fingerprint, JobHeader, PLAN_AGAIN};
 use crate::plan::input_identity::InputChange;
 use crate::plan::inputs::input_paths;
 use crate::plan::job_plan::Plan;
@@ -70,6 +70,21 @@ impl PlannedJob {
         }
         Ok(())
     }
+}
+
+/// Tells whether the job with these `options` and this fingerprint is planned, after `submission`. One process may have begun a small job, which
+/// has no tasks.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Broken`] on the plan or the journal.
+pub(crate) fn is_planned(
+    directory: &JobDirectory,
+    options: &JobOptions,
+    fingerprint: &Fingerprint,
+    submission: u64,
+) -> Result<bool> {
+    let is_same = planned(directory, submission)?.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
+    Ok(is_same && PlannedJob::open(directory, options, submission)?.is_some())
 }
 
 /// Returns the header of the planned job of several parts in the job directory, and whether all its results are written. A plan from before

@@ -5,7 +5,7 @@ use crate::durable::atomic_file::remove_file;
 use crate::durable::directory::JobDirectory;
 use crate::durable::listing::entries;
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use sys::{Error, Result, disk};
 
 /// What tasks say then.
@@ -28,12 +28,12 @@ pub(crate) fn leave_note(directory: &JobDirectory, submission: u64) -> Result<()
 fn found(directory: &JobDirectory) -> Result<Vec<(PathBuf, u64)>> {
     // Some network file systems remember for a while that a file is not there, but not what is in a folder.
     let there = entries(directory.job())?;
-    Ok(there.into_iter().filter_map(|path| Some((submission_in(&path)?, path))).map(|(of, path)| (path, of)).collect())
-}
-
-fn submission_in(path: &Path) -> Option<u64> {
-    let (name, submission) = path.file_name()?.to_str()?.split_once('.')?;
-    submission.parse().ok().filter(|_| name == NAME)
+    let note = |path: PathBuf| {
+        let (name, submission) = path.file_name()?.to_str()?.split_once('.')?;
+        let submission = submission.parse().ok().filter(|_| name == NAME)?;
+        Some((path, submission))
+    };
+    Ok(there.into_iter().filter_map(note).collect())
 }
 
 /// Returns the notes that are there, as the journal would name them.

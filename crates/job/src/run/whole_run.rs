@@ -8,7 +8,7 @@ use crate::records::{JobStep, Journal};
 use crate::run::job::Process;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::cell::RefCell;
 use std::time::SystemTime;
 use sys::Result;
 
@@ -23,7 +23,7 @@ pub(crate) struct WholeRun<'a> {
     /// The number of phases that an interrupted run had completed.
     pub(crate) resumed: u64,
     /// The stages that have ended.
-    pub(crate) stages: Mutex<Vec<StageStats>>,
+    pub(crate) stages: RefCell<Vec<StageStats>>,
 }
 
 impl WholeRun<'_> {
@@ -51,15 +51,10 @@ impl WholeRun<'_> {
 
     /// Adds a stage to the report, or to the stage of the same name: parts have the same stages.
     pub(crate) fn add_stage(&self, added: StageStats) {
-        let mut stages = self.stages();
+        let mut stages = self.stages.borrow_mut();
         match stages.iter_mut().find(|stage| stage.stage == added.stage) {
             Some(stage) => stage.add(&added),
             None => stages.push(added),
         }
-    }
-
-    /// Returns the stages that have ended.
-    pub(crate) fn stages(&self) -> MutexGuard<'_, Vec<StageStats>> {
-        self.stages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

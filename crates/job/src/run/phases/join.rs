@@ -3,23 +3,28 @@
 use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::merge_records::{HullCount, Seam, SeamOfTile};
 use crate::mesh::merge::merge_frontiers;
-use crate::partition::part_points::ReadInputs;
+use crate::partition::result::Partition;
 use crate::partition::tree::{NodeKind, Tree};
 use crate::plan::budget::merge_memory;
-use crate::records::{JobStep, StepRecord, Store};
+use crate::records::{FinishedBorder, JobStep, StepRecord, Store};
 use crate::run::folder::{Folder, once};
 use crate::run::job::{Job, OpenPart};
 use crate::run::meshed_part::MeshedPart;
 use crate::run::phases::appearance::{SitesOfParts, count_sites, early_appearance, final_appearance};
 use crate::run::phases::read_phase::sum_up;
 use crate::tiles::appearance::TileAppearance;
+use crate::tiles::border_normals::finished_border;
 use crate::tiles::dependencies::FinishedTile;
 use crate::tiles::seam::seam_of;
 use serde::de::IgnoredAny;
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 use sys::Result;
 use tiles::options::MaxEdge;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+
+/// How many borders of other parts stay in memory, some ten kilobytes each.
+const MOST_KNOWN: usize = 1000;
 
 /// The merges above the parts, done.
 pub(crate) struct JoinedParts {
@@ -29,6 +34,8 @@ pub(crate) struct JoinedParts {
     pub(crate) appearance: Arc<TileAppearance>,
     /// The key of the rule for long triangles, with `--update`.
     key_of_rule: u64,
+    /// Finished borders of tiles that tiles of other parts have asked for.
+    borders: Mutex<HashMap<TileIndex, FinishedBorder>>,
 }
 
 /// Tells whether there is anything to do once all parts are meshed.
@@ -44,16 +51,12 @@ pub(crate) fn join_parts(job: &Job) -> crate::Result<()> {
     if !is_needed(job) {
         return Ok(());
     }
-    once(job, job.above(), JobStep::Join, key_of_meshes(job)?, |folder| {
+    let key = job.key(|| key_of_meshes(job))?;
+    once(job, job.above(), JobStep::Join, key, |folder| {
         let parts = job.parts.all().len() as u64;
         let stage = job.progress.stage("join", parts, "parts");
-        let (mut sites, mut read) = (0, Vec::new());
-        for entries in job.parts.all().map(|part| job.entries(part)) {
-            let entries = entries?;
-            sites += entries.figures::<MeshedPart>(JobStep::Mesh)?.leaves.sites;
-            read.extend(entries.known::<ReadInputs>(JobStep::Read)?);
-        }
-        let all = SitesOfParts { sites, bounds: sum_up(job, read.iter())?.1 };
+        let sites = |part| Ok(job.entries(part)?.figures::<MeshedPart>(JobStep::Mesh)?.leaves.sites);
+        let all = SitesOfParts { sites: job.parts.all().map(sites).sum::<Result<_>>()?, bounds: sum_up(job)?.1 };
         merge_below(job, folder, NodeIndex::ROOT)?;
         count_sites(job, all, &folder.store)?;
         stage.advance(parts);
@@ -62,11 +65,8 @@ pub(crate) fn join_parts(job: &Job) -> crate::Result<()> {
     .map(|_| ())
 }
 
-/// Returns the key of the merges above the parts, with `--update`: a hash of the keys of all meshes. Else 0.
+/// Returns the key of the merges above the parts: a hash of the keys of all meshes.
 fn key_of_meshes(job: &Job) -> Result<u64> {
-    if !job.plan.options.updates {
-        return Ok(0);
-    }
     let mut keys = Vec::new();
     for part in job.parts.all() {
         keys.extend(job.entries(part)?.done::<IgnoredAny>(JobStep::Mesh)?.map(|mesh| mesh.key));
@@ -140,17 +140,16 @@ fn merge_at(job: &Job, folder: &Folder, node: NodeIndex, threads: usize) -> crat
 }
 
 impl JoinedParts {
-    /// Opens what [`join_parts`] has left; `None` if it is not complete.
+    /// Opens what [`join_parts`] has left.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on its folder.
-    pub(crate) fn open(job: &Job) -> Result<Option<JoinedParts>> {
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on its folder, also if that is not complete.
+    pub(crate) fn open(job: &Job) -> Result<JoinedParts> {
         if let (false, Some(appearance)) = (is_needed(job), early_appearance(job)?) {
-            return Ok(Some(JoinedParts { store: None, appearance, key_of_rule: 0 }));
+            return Ok(JoinedParts { store: None, appearance, key_of_rule: 0, borders: Mutex::default() });
         }
         let entries = job.entries(job.above())?;
-        let Some(all) = entries.known(JobStep::Join)? else { return Ok(None) };
-        let store = entries.store()?;
+        let (all, store) = (entries.figures(JobStep::Join)?, entries.store()?);
         let tree = &job.parts.tree;
         // Without the seam of a node, that node and those above it would be holes in the terrain.
         let merges = (0..tree.nodes.len()).map(NodeIndex::new).filter(|&node| tree.is_merge(node));
@@ -160,7 +159,7 @@ impl JoinedParts {
         let appearance = final_appearance(job, all, &store)?;
         let rule = if job.plan.options.updates { format!("{:?}", appearance.style.max_edge) } else { String::new() };
         let key_of_rule = xxh3_64(rule.as_bytes());
-        Ok(Some(JoinedParts { store: Some(store), appearance, key_of_rule }))
+        Ok(JoinedParts { store: Some(store), appearance, key_of_rule, borders: Mutex::default() })
     }
 
     /// Returns what is merged while parts are still to come.
@@ -169,23 +168,50 @@ impl JoinedParts {
     /// As [`JoinedParts::open`].
     pub(crate) fn so_far(job: &Job, appearance: Arc<TileAppearance>) -> Result<JoinedParts> {
         let store = is_needed(job).then(|| job.entries(job.above())?.store()).transpose()?;
-        Ok(JoinedParts { store, appearance, key_of_rule: 0 })
+        Ok(JoinedParts { store, appearance, key_of_rule: 0, borders: Mutex::default() })
     }
 
-    /// Returns what all seams have of `tile` of the part with `store` and `tree`.
+    /// Returns the finished border of a tile of another part than that which is written. One that is not stored yet is computed: a part's folder
+    /// has one writer.
     ///
     /// # Errors
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a store.
-    pub(crate) fn seam_of(&self, job: &Job, store: &Store, tree: &Tree, tile: TileIndex) -> Result<SeamOfTile> {
-        let mut seam = seam_of(store, tree, FinishedTile { tile, last_merge: NodeIndex::ROOT })?;
-        let Some(joined) = &self.store else { return Ok(seam) };
+    pub(crate) fn border_of(&self, job: &Job, tile: TileIndex) -> Result<FinishedBorder> {
+        let known = || self.borders.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(border) = known().get(&tile) {
+            return Ok(border.clone());
+        }
+        let OpenPart { store, partition: Partition { tree, .. }, .. } = &*job.open(tile.part())?;
+        // Another machine may be writing it. But what a written tile needed may be gone, and then it is whole.
+        let border = match store.has_whole(StepRecord::FinishedBorder(tile))? {
+            true => FinishedBorder::load(store, tile)?,
+            false => {
+                let mut seam = seam_of(store, tree, FinishedTile { tile, last_merge: NodeIndex::ROOT })?;
+                self.add_seams(job, tile, &mut seam)?;
+                finished_border(store, tree, &self.appearance.style, tile, &seam)?
+            }
+        };
+        let mut known = known();
+        if known.len() >= MOST_KNOWN {
+            known.clear();
+        }
+        known.insert(tile, border.clone());
+        Ok(border)
+    }
+
+    /// Adds what the seams above the parts have of `tile`.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store.
+    pub(crate) fn add_seams(&self, job: &Job, tile: TileIndex, seam: &mut SeamOfTile) -> Result<()> {
+        let Some(joined) = &self.store else { return Ok(()) };
         let above = job.parts.tree.merges_above(job.parts.node(tile.part()));
         // A tile that is finished before all parts are merged has no seam above.
         for node in above.take_while(|node| joined.has(StepRecord::Seam(*node))) {
             seam.add(Seam::touching(joined, node, tile)?);
         }
         seam.sort();
-        Ok(seam)
+        Ok(())
     }
 
     /// Returns the key of `tile`: a hash of what the merges above the parts have of it, and of the rule for long triangles.
@@ -194,11 +220,7 @@ impl JoinedParts {
     /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the store.
     pub(crate) fn key_of_tile(&self, job: &Job, tile: TileIndex) -> Result<u64> {
         let mut seam = SeamOfTile::default();
-        if let Some(joined) = &self.store {
-            let above = job.parts.tree.merges_above(job.parts.node(tile.part()));
-            above.into_iter().try_for_each(|node| Seam::touching(joined, node, tile).map(|found| seam.add(found)))?;
-        }
-        seam.sort();
+        self.add_seams(job, tile, &mut seam)?;
         let mut hasher = Xxh3::with_seed(self.key_of_rule);
         hasher.update(&seam.triangles.len().to_le_bytes());
         hasher.update(bytemuck::cast_slice(&seam.triangles));

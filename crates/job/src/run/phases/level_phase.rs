@@ -48,7 +48,7 @@ pub(crate) fn levels_over(
     has_tileset: bool,
     top_of: TopOf,
 ) -> crate::Result<LevelStats> {
-    let key = key_of_tiles(job, part, has_tileset)?;
+    let key = job.key(|| key_of_tiles(job, part, has_tileset))?;
     if let Some(done) = done_with(job, part, JobStep::Levels, key)? {
         return Ok(done.figures);
     }

@@ -4,7 +4,6 @@
 use crate::Result;
 use crate::durable::atomic_file::{remove_file, remove_tree};
 use crate::index::{NodeIndex, PartIndex, TileIndex};
-use crate::mesh::leaf::LeafStats;
 use crate::partition::point_file::PointFiles;
 use crate::partition::result::Partition;
 use crate::progress::stats::StageStats;
@@ -12,13 +11,12 @@ use crate::records::{JobStep, JournalEntry, RecordChanges, StepRecord, Store};
 use crate::run::folder::{Folder, once};
 use crate::run::job::Job;
 use crate::run::meshed_part::{MeshedPart, SomeTiles};
-use crate::run::phases::postponed_merges::PostponedMerges;
 use crate::run::phases::select_phase::{key_of_vertices, vertices_of};
 use crate::run::phases::tile_queue::TileQueue;
 use crate::run::phases::tree_walk::TreeWalk;
 use crate::tiles::appearance::TileAppearance;
 use std::collections::HashSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// Meshes a part whose points have all been read, unless that is done. With an `appearance` its finished tiles are written meanwhile.
 /// Temporary files of other parts take `others` bytes; `None` where nothing tells.
@@ -31,7 +29,7 @@ pub(crate) fn mesh_one(
     appearance: Option<&Arc<TileAppearance>>,
     others: Option<u64>,
 ) -> Result<MeshedPart> {
-    let key = key_of_vertices(job, part)?;
+    let key = job.key(|| key_of_vertices(job, part))?;
     let meshed = once(job, part, JobStep::Mesh, key, |folder| mesh(job, folder, part, appearance, others))?;
     match job.plan.options.updates {
         true => remove_divided_points(job, part)?,
@@ -50,21 +48,12 @@ fn mesh(
     let max_points_per_tile = job.plan.options.triangulation.max_points_per_tile.0;
     let partition = vertices_of(job, part, &folder.store)?.partition(&folder.directory, max_points_per_tile)?;
     partition.save(&folder.store)?;
-    let MeshInTiles { leaves, tiles, open, stages } = mesh_in_tiles(job, folder, &partition, appearance)?;
-    let is_kept = job.plan.keeps_mesh();
-    if !is_kept {
+    let (mut meshed, tiles, stages) = mesh_in_tiles(job, folder, &partition, appearance)?;
+    if !meshed.is_kept {
         free_inner_records(&folder.store, &partition, &tiles.written)?;
     }
-    let meshed = MeshedPart {
-        points: partition.kept,
-        leaves,
-        tiles: partition.blocks.len(),
-        open,
-        is_kept,
-        temporary: partition.point_bytes + folder.store.peak() + others.unwrap_or(0),
-        by_task: job.is_task,
-        stored: folder.store.bytes(),
-    };
+    meshed.temporary = partition.point_bytes + folder.store.peak() + others.unwrap_or(0);
+    meshed.stored = folder.store.bytes();
     let meshed = folder.done_now(meshed, stages);
     let [of_mesh, of_tiles] = by_style(folder.store.take_changes());
     // Another style needs the mesh, but not the tiles.
@@ -91,31 +80,23 @@ fn by_style(changes: RecordChanges) -> [RecordChanges; 2] {
     [RecordChanges { written: of_mesh, dropped }, RecordChanges { written: of_tiles, dropped: Vec::new() }]
 }
 
-/// The mesh of a part, written as tiles as far as it is finished.
-struct MeshInTiles {
-    leaves: LeafStats,
-    tiles: SomeTiles,
-    /// The tiles that merges above the part may change.
-    open: Vec<TileIndex>,
-    stages: Vec<StageStats>,
-}
-
-/// Triangulates all leaves of a part, merges their frontiers, and writes the tiles that are finished.
+/// Triangulates all leaves of a part, merges their frontiers, and writes the tiles that are finished. Returns what is known of the mesh, of the
+/// tiles, and the stages.
 fn mesh_in_tiles(
     job: &Job,
     folder: &Folder,
     partition: &Partition,
     appearance: Option<&Arc<TileAppearance>>,
-) -> Result<MeshInTiles> {
+) -> Result<(MeshedPart, SomeTiles, Vec<StageStats>)> {
     let stage = job.progress.stage("mesh", partition.kept, "points");
     let activity = job.progress.activity("triangulate", "points");
     let queue = TileQueue::new(job, folder, partition, &stage, appearance.cloned());
     let points = PointFiles::open(&folder.directory.point_files()?)?;
-    let unmerged = PostponedMerges::default();
+    let unmerged = Mutex::default();
     let walk = TreeWalk { job, folder, partition, points, stage: &stage, activity: &activity, queue: &queue, unmerged };
     let leaves = rayon::scope(|scope| {
         let leaves = walk.walk(scope, NodeIndex::ROOT);
-        queue.attempt(|| walk.unmerged.check(&job.plan.options));
+        queue.attempt(|| walk.check_memory());
         leaves
     });
     // This closes the point files: an open file is not freed when it is removed.
@@ -123,7 +104,16 @@ fn mesh_in_tiles(
     let mut stages = vec![activity.finish()];
     let (tiles, open) = queue.finish(&mut stages)?;
     stage.finish();
-    Ok(MeshInTiles { leaves: leaves.unwrap_or_default(), tiles, open, stages })
+    let meshed = MeshedPart {
+        points: partition.kept,
+        leaves: leaves.unwrap_or_default(),
+        tiles: partition.blocks.len(),
+        open,
+        is_kept: job.plan.keeps_mesh(),
+        by_task: job.is_task,
+        ..MeshedPart::default()
+    };
+    Ok((meshed, tiles, stages))
 }
 
 /// Gives back what no phase needs any more once a part is meshed: all but the frontier of the part, and what the tiles need that are not

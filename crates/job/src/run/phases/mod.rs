@@ -10,27 +10,22 @@ pub(crate) mod level_phase;
 pub(crate) mod mesh_phase;
 mod outdated_levels;
 mod outdated_tiles;
-pub(crate) mod part_progress;
 pub(crate) mod plan_phase;
-mod postponed_merges;
 pub(crate) mod publish_phase;
 pub(crate) mod read_phase;
 pub(crate) mod select_phase;
 pub(crate) mod tile_phase;
 mod tile_queue;
 mod tree_walk;
-mod waiting_tiles;
 
 use crate::Result;
 use crate::index::PartIndex;
-use crate::partition::part_points::ReadInputs;
 use crate::partition::parts::Parts;
 use crate::plan::first_plan_file::keep_first_plan;
 use crate::plan::job_plan::Plan;
 use crate::publish::written_tiles::wants_tileset;
 use crate::report::job_report::Report;
 use crate::run::job::Job;
-use crate::run::meshed_part::MeshedPart;
 use crate::run::phases::appearance::early_appearance;
 use crate::run::phases::join::{JoinedParts, join_parts};
 use crate::run::phases::level_phase::levels_of_part;
@@ -40,8 +35,7 @@ use crate::run::phases::plan_phase::settled;
 use crate::run::phases::publish_phase::publish_job;
 use crate::run::phases::read_phase::{read_for, sum_up};
 use crate::run::phases::select_phase::{select_vertices, selects};
-use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
-use crate::run::phases::waiting_tiles::WaitingTiles;
+use crate::run::phases::tile_phase::{WaitingTiles, finish_part};
 use crate::run::whole_run::WholeRun;
 use crate::tiles::write_tile::TileStats;
 
@@ -62,11 +56,10 @@ pub(crate) fn do_phases(run: &WholeRun, plan: Plan) -> Result<Report> {
     read_and_mesh(job)?;
     // Step 4 for the nodes above the parts.
     join_parts(job)?;
-    let joined = JoinedParts::open(job)?.ok_or_else(|| sys::Error::Broken("the parts are not joined".into()))?;
+    let joined = JoinedParts::open(job)?;
     forget_outdated_tiles(job, &joined)?;
     // Steps 5 and 6 for the tiles that have waited.
-    let borders = &ForeignBorders::new(job, &joined);
-    let tiles = parts.all().map(|part| finish_part(borders, part)).sum::<Result<TileStats>>()?;
+    let tiles = parts.all().map(|part| finish_part(job, &joined, part)).sum::<Result<TileStats>>()?;
     // Step 7 for each part.
     let has_tileset = wants_tileset(plan, &tiles);
     parts.all().try_for_each(|part| levels_of_part(job, &joined, part, has_tileset).map(|_| ()))?;
@@ -76,21 +69,19 @@ pub(crate) fn do_phases(run: &WholeRun, plan: Plan) -> Result<Report> {
 
 /// Reads and meshes all parts, or those that an interrupted run left.
 fn read_and_mesh(job: &Job) -> Result<()> {
-    let (mut read, mut meshed) = (Vec::<ReadInputs>::new(), Vec::<MeshedPart>::new());
-    // Bytes of points that wait, by part.
-    let mut waiting = vec![0; job.parts.all().len()];
-    let read_next = |part: PartIndex, read: &mut Vec<ReadInputs>, waiting: &mut [u64]| -> Result<()> {
-        let malformed = read.iter().map(|inputs| inputs.summary.counts.malformed).sum();
+    // Bytes of points that wait, by part, and bytes that parts keep once they are meshed.
+    let (mut malformed, mut waiting, mut stored) = (0, vec![0; job.parts.all().len()], 0);
+    let mut read_next = |part: PartIndex, waiting: &mut [u64]| -> Result<()> {
         let inputs = read_for(job, part, malformed)?;
         inputs.by_part.iter().for_each(|found| waiting[found.part.get()] += found.bytes);
-        read.push(inputs);
+        malformed += inputs.summary.counts.malformed;
         Ok(())
     };
     let selects = selects(job.plan);
     if selects {
         // Any point may decide about any other.
-        job.parts.all().try_for_each(|part| read_next(part, &mut read, &mut waiting))?;
-        sum_up(job, read.iter())?;
+        job.parts.all().try_for_each(|part| read_next(part, &mut waiting))?;
+        sum_up(job)?;
         select_vertices(job)?;
     }
     let appearance = early_appearance(job)?;
@@ -99,16 +90,12 @@ fn read_and_mesh(job: &Job) -> Result<()> {
     let mut front = waits.map(|appearance| WaitingTiles::new(job, appearance));
     for part in job.parts.all() {
         if !selects {
-            read_next(part, &mut read, &mut waiting)?;
+            read_next(part, &mut waiting)?;
         }
-        let stored = match &front {
-            Some(front) => front.stored(),
-            None => meshed.iter().map(|part| part.stored).sum::<u64>(),
-        };
         let others = waiting[part.get() + 1..].iter().sum::<u64>() + stored;
-        let done = mesh_one(job, part, appearance.as_ref(), Some(others))?;
-        front.as_mut().map(|front| front.pass(part, &done)).transpose()?;
-        meshed.push(done);
+        let meshed = mesh_one(job, part, appearance.as_ref(), Some(others))?;
+        stored += meshed.stored;
+        front.as_mut().map(|front| front.pass(part, meshed, &mut stored)).transpose()?;
     }
-    sum_up(job, read.iter()).map(|_| ())
+    sum_up(job).map(|_| ())
 }

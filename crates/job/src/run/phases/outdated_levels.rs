@@ -23,15 +23,12 @@ pub(crate) struct MadeLevel {
     pub(crate) stats: LevelStats,
 }
 
-/// Returns the key of the coarser tiles of `part`, or of those above the parts, with `--update`: a hash of the checksums of the exact ones, and of what coarser ones are
-/// made of them (none unless `has_tileset`). Else 0.
+/// Returns the key of the coarser tiles of `part`, or of those above the parts: a hash of the checksums of the exact ones, and of what coarser
+/// ones are made of them (none unless `has_tileset`).
 ///
 /// # Errors
 /// [`sys::Error::Io`] if a journal cannot be read.
 pub(crate) fn key_of_tiles(job: &Job, part: PartIndex, has_tileset: bool) -> sys::Result<u64> {
-    if !job.plan.options.updates {
-        return Ok(0);
-    }
     let mut hasher = hasher_of_levels(job, has_tileset);
     for part in job.parts.all().filter(|below| *below == part || part == job.above()) {
         let entries = job.entries(part)?;
@@ -94,7 +91,7 @@ pub(crate) fn keys_of_levels(job: &Job, part: PartIndex, hierarchy: &Hierarchy) 
 ///
 /// # Errors
 /// [`sys::Error::Io`] on the folder, [`crate::Error::InUse`] if another process has it.
-pub(crate) fn forget_outdated_levels(
+pub(super) fn forget_outdated_levels(
     job: &Job,
     part: PartIndex,
     hierarchy: &Hierarchy,

@@ -3,7 +3,7 @@
 
 use crate::Result;
 use crate::index::{PartIndex, TileIndex};
-use crate::records::{JobStep, JournalEntry, StepRecord};
+use crate::records::{JobStep, StepRecord};
 use crate::run::job::Job;
 use crate::run::meshed_part::{SomeTiles, WaitedTile};
 use crate::run::part_entries::Done;
@@ -21,7 +21,7 @@ pub(crate) fn forget_outdated_tiles(job: &Job, joined: &JoinedParts) -> Result<(
         return Ok(());
     }
     let parts: Vec<PartIndex> = job.parts.all().collect();
-    let tiles_of = |&part: &PartIndex| SomeTiles::of(&job.entries(part)?);
+    let tiles_of = |&part: &PartIndex| job.entries(part)?.tiles();
     let known = parts.par_iter().map(tiles_of).collect::<sys::Result<Vec<SomeTiles>>>()?;
     let written: HashSet<TileIndex> = known.iter().flat_map(|tiles| &tiles.written).copied().collect();
     let waited: Vec<&WaitedTile> = known.iter().flat_map(|tiles| &tiles.waited).collect();
@@ -44,34 +44,27 @@ pub(crate) fn forget_outdated_tiles(job: &Job, joined: &JoinedParts) -> Result<(
 fn forget_tiles(job: &Job, part: PartIndex, outdated: &HashSet<TileIndex>) -> Result<()> {
     let output = job.directory.output();
     let paths = outdated.iter().flat_map(|tile| [output.tile(tile.number()), output.cut_tile(tile.number())]);
-    let names = paths.map(|path| job.directory.name(&path)).collect();
-    job.rewrite(part, |entry| match entry.step {
-        JobStep::Tiles => without(entry, outdated, &names).map(Some),
-        _ => Ok(Some(entry)),
-    })
-}
-
-/// Returns the entry without these tiles, whose results have these `names`.
-fn without(
-    mut entry: JournalEntry,
-    outdated: &HashSet<TileIndex>,
-    names: &HashSet<PathBuf>,
-) -> sys::Result<JournalEntry> {
-    let mut done = entry.figures::<Done<SomeTiles>>()?;
-    let SomeTiles { stats, written, waited, .. } = &mut done.figures;
-    if waited.is_empty() {
-        // The tiles that have not waited depend on no other part.
-        return Ok(entry);
-    }
-    waited.retain(|tile| !outdated.contains(&tile.tile));
-    written.retain(|tile| !outdated.contains(tile));
-    *stats = waited.iter().map(|tile| tile.stats).sum();
-    entry.files.retain(|file| !names.contains(&file.name));
-    entry.changes.written.retain(|record| match record.key() {
-        StepRecord::FinishedBorder(tile) | StepRecord::Pixels(tile) | StepRecord::Tile(tile) => {
-            !outdated.contains(&tile)
+    let names: HashSet<PathBuf> = paths.map(|path| job.directory.name(&path)).collect();
+    job.rewrite(part, |mut entry| {
+        if entry.step != JobStep::Tiles {
+            return Ok(Some(entry));
         }
-        _ => true,
-    });
-    entry.with_figures(&done)
+        let mut done = entry.figures::<Done<SomeTiles>>()?;
+        let SomeTiles { stats, written, waited, .. } = &mut done.figures;
+        if waited.is_empty() {
+            // The tiles that have not waited depend on no other part.
+            return Ok(Some(entry));
+        }
+        waited.retain(|tile| !outdated.contains(&tile.tile));
+        written.retain(|tile| !outdated.contains(tile));
+        *stats = waited.iter().map(|tile| tile.stats).sum();
+        entry.files.retain(|file| !names.contains(&file.name));
+        entry.changes.written.retain(|record| match record.key() {
+            StepRecord::FinishedBorder(tile) | StepRecord::Pixels(tile) | StepRecord::Tile(tile) => {
+                !outdated.contains(&tile)
+            }
+            _ => true,
+        });
+        entry.with_figures(&done).map(Some)
+    })
 }

@@ -80,8 +80,8 @@ pub(crate) fn settled(run: &WholeRun, mut plan: Plan) -> Result<Plan> {
     let parts = Parts::of(&plan);
     if parts.all().len() == 1 {
         let job = Job::new(run.process, &plan, &parts);
-        let read = read_for(&job, PartIndex::FIRST, 0)?;
-        let (summary, bounds) = sum_up(&job, std::iter::once(&read))?;
+        read_for(&job, PartIndex::FIRST, 0)?;
+        let (summary, bounds) = sum_up(&job)?;
         plan.claims = Some(Claims { bounds, max_rgb: summary.counts.max_rgb });
     }
     if let Some(claims) = plan.claims.filter(|_| plan.coarsening.measured) {

@@ -1,36 +1,35 @@
 //! Step 8: the coarser tiles above the parts, what is beside the tiles, and the report.
 
 use crate::durable::atomic_file::write_pending;
-use crate::durable::file_list::listed;
+use crate::durable::journal::listed;
 use crate::index::{PartIndex, TileIndex};
 use crate::levels::hierarchy::Hierarchy;
 use crate::levels::make_level::{Child, LevelStats};
 use crate::progress::stage::Stage;
-use crate::progress::stats::StageStats;
 use crate::publish::classified::{ClassifiedInputs, write_all};
-use crate::publish::contours::write_contours::{ContourStats, ContourWork};
+use crate::publish::contours::write_contours::ContourWork;
 use crate::publish::exports::write_exports::{ExportWork, Exports};
 use crate::publish::map_tiles::write_map_tiles::MapTileWork;
 use crate::publish::published::Published;
 use crate::publish::raster::write_raster::RasterWork;
 use crate::publish::side_files::{EachTile, write_side_files};
-use crate::publish::terrain_tiles::write_terrain::TerrainWork;
+use crate::publish::terrain_tiles::write_terrain::{TerrainStats, TerrainWork};
 use crate::publish::tileset_tree::TilesOfTree;
 use crate::publish::written_tiles::{WrittenTiles, check_some_triangles, wants_tileset};
 use crate::records::{JobStep, Store};
 use crate::report::job_report::{PartFigures, Report, ReportParts, SlowestPart};
 use crate::run::job::Job;
+use crate::run::meshed_part::MeshedPart;
 use crate::run::part_entries::{Done, PartEntries};
 use crate::run::phases::join::JoinedParts;
 use crate::run::phases::level_phase::{hierarchy_of, levels_over};
-use crate::run::phases::outdated_levels::{forget_outdated_levels, level_sizes};
-use crate::run::phases::part_progress::PartProgress;
+use crate::run::phases::outdated_levels::level_sizes;
 use crate::run::phases::read_phase::sum_up;
-use crate::run::phases::select_phase::found_ground;
+use crate::run::phases::select_phase::{SelectedPart, found_ground};
 use crate::run::update::changes::write_changes;
 use crate::run::whole_run::WholeRun;
 use serde::de::IgnoredAny;
-use sys::{Error, Result, Warnings};
+use sys::{Error, Result};
 use tiles::checksums::list_text;
 use tiles::tiles3d::tileset::TilesetNode;
 
@@ -40,27 +39,21 @@ use tiles::tiles3d::tileset::TilesetNode;
 /// Those of the steps.
 pub(crate) fn publish_job(run: &WholeRun, job: &Job, joined: &JoinedParts) -> crate::Result<Report> {
     let (plan, directory) = (job.plan, job.directory);
-    let parts = job.parts.all().map(|part| PartProgress::of(&job.entries(part)?));
-    let parts = parts.collect::<Result<Vec<PartProgress>>>()?;
-    let mut figures = figures_of(&parts)?;
+    let (figures, points) = figures_of(job)?;
     check_some_triangles(&figures.tiles, plan)?;
-    let (summary, bounds) = sum_up(job, parts.iter().filter_map(|part| part.read.as_ref()))?;
-    let join: Option<Done<IgnoredAny>> = job.entries(job.above())?.done(JobStep::Join)?;
-    let before = stages_of(&parts, &BEFORE_JOIN).chain(join.iter().flat_map(|join| &join.stages));
-    before.chain(stages_of(&parts, &AFTER_JOIN)).for_each(|stage| run.add_stage(stage.clone()));
-    figures.peak_memory = figures.peak_memory.max(join.and_then(|join| join.peak_memory));
-    let points: Vec<u64> = parts.iter().flat_map(|part| &part.mesh).map(|mesh| mesh.points).collect();
+    let (summary, bounds) = sum_up(job)?;
     let above = Hierarchy::above_parts(&job.parts.tree, &points, level_sizes(plan));
     let has_tileset = wants_tileset(plan, &figures.tiles);
-    if !has_tileset && parts.len() > 1 {
-        // A run before may have had one.
-        forget_outdated_levels(job, job.above(), &above, false)?;
+    let mut levels = figures.levels;
+    if !above.tiles.is_empty() {
+        let top_of = |part: PartIndex| {
+            let open = job.open(part)?;
+            Child::top(job.directory, &open.store, &open.partition.tree)
+        };
+        levels += levels_over(job, joined, job.above(), &above, has_tileset, &top_of)?;
     }
-    let tileset = has_tileset.then(|| levels_and_root(run, job, joined, &above)).transpose()?;
-    let tileset = tileset.map(|(root, mut levels)| {
-        levels += figures.levels;
-        (root, levels)
-    });
+    add_stages(run, job)?;
+    let root = has_tileset.then(|| root_of_all(job, &above)).transpose()?;
     let written = WrittenTiles {
         stats: figures.tiles,
         bounds,
@@ -69,7 +62,7 @@ pub(crate) fn publish_job(run: &WholeRun, job: &Job, joined: &JoinedParts) -> cr
         appearance: &joined.appearance,
         tiles: &TilesOfParts(job),
     };
-    let mut published = publish(run, job, &written, tileset)?;
+    let mut published = publish(run, job, &written, root, levels)?;
     published.warnings.extend(plan.grown_parts_warning(&points));
     let of_parts = PartEntries::of_all(directory, job.id)?;
     let of_parts = of_parts.iter().flat_map(|part| part.files(None)).cloned();
@@ -86,7 +79,7 @@ pub(crate) fn publish_job(run: &WholeRun, job: &Job, joined: &JoinedParts) -> cr
         triangulator: job.triangulator,
         update,
         wall_s: run.wall_s(),
-        stages: std::mem::take(&mut *run.stages()),
+        stages: run.stages.take(),
         threads: job.threads,
         resumed: run.resumed,
         clock: job.clock,
@@ -102,76 +95,71 @@ pub(crate) fn publish_job(run: &WholeRun, job: &Job, joined: &JoinedParts) -> cr
     Ok(report)
 }
 
-/// The phases of parts before and after the parts are joined, in their order.
-const BEFORE_JOIN: [JobStep; 3] = [JobStep::Read, JobStep::Select, JobStep::Mesh];
-const AFTER_JOIN: [JobStep; 2] = [JobStep::Tiles, JobStep::Levels];
+/// The phases of parts and of the nodes above them, in their order.
+const STEPS: [JobStep; 6] =
+    [JobStep::Read, JobStep::Select, JobStep::Mesh, JobStep::Join, JobStep::Tiles, JobStep::Levels];
 
-/// Returns the stages of these phases of all parts.
-fn stages_of<'a>(parts: &'a [PartProgress], steps: &'a [JobStep]) -> impl Iterator<Item = &'a StageStats> {
-    steps.iter().flat_map(|&step| parts.iter().flat_map(move |part| part.stages_of(step)))
+/// Adds the stages of these phases to the report.
+fn add_stages(run: &WholeRun, job: &Job) -> Result<()> {
+    let mut costs = Vec::new();
+    for part in job.parts.all().chain([job.above()]) {
+        costs.extend(job.entries(part)?.costs()?);
+    }
+    let stages = STEPS.iter().flat_map(|step| costs.iter().filter(move |(of, _)| of == step));
+    stages.flat_map(|(_, done)| &done.stages).for_each(|stage| run.add_stage(stage.clone()));
+    Ok(())
 }
 
-/// Returns what all parts hold together.
-fn figures_of(parts: &[PartProgress]) -> Result<PartFigures> {
-    let mut all = PartFigures { parts: parts.len() as u64, ..PartFigures::default() };
-    let (mut together, mut by_tasks) = (0, false);
-    for (number, part) in parts.iter().enumerate() {
-        let (Some(mesh), Some(levels)) = (&part.mesh, part.levels) else {
-            return Err(Error::Broken(format!("part {number} is not complete")));
-        };
+/// Returns what all parts hold together, and the number of points of each.
+fn figures_of(job: &Job) -> Result<(PartFigures, Vec<u64>)> {
+    let count = job.parts.all().len();
+    let (mut all, mut counts) = (PartFigures { parts: count as u64, ..PartFigures::default() }, Vec::new());
+    let (mut together, mut stored, mut selecting, mut cpu_s, mut by_tasks) = (0, 0, 0, 0.0, false);
+    for part in job.parts.all() {
+        let entries = job.entries(part)?;
+        let (mesh, costs) = (entries.figures::<MeshedPart>(JobStep::Mesh)?, entries.costs()?);
         all.leaves += mesh.leaves;
-        all.tiles += part.tiles.stats;
-        all.levels += levels;
-        all.peak_memory = all.peak_memory.max(part.peak_memory());
+        all.tiles += entries.tiles()?.stats;
+        all.levels += entries.figures::<LevelStats>(JobStep::Levels)?;
+        all.peak_memory = costs.iter().map(|(_, done)| done.peak_memory).fold(all.peak_memory, Ord::max);
+        cpu_s += costs.iter().flat_map(|(_, done)| &done.stages).map(|stage| stage.cpu_s).sum::<f64>();
         all.temporary = all.temporary.max(mesh.temporary);
-        (together, by_tasks) = (together + mesh.temporary, by_tasks || mesh.by_task);
-        let (seconds, points) = (part.seconds(), mesh.points);
-        if parts.len() > 1 && all.slowest.is_none_or(|slowest| slowest.seconds <= seconds) {
-            all.slowest = Some(SlowestPart { part: number as u64, seconds, points });
+        (together, stored) = (together + mesh.temporary, stored + entries.stored());
+        by_tasks |= mesh.by_task;
+        let (seconds, points) = (entries.seconds()?, mesh.points);
+        counts.push(points);
+        if count > 1 && all.slowest.is_none_or(|slowest| slowest.seconds <= seconds) {
+            all.slowest = Some(SlowestPart { part: part.get() as u64, seconds, points });
+        }
+        if let Some(selected) = entries.known::<SelectedPart>(JobStep::Select)? {
+            all.selection = all.selection.or(selected.all);
+            all.wanted += selected.wanted;
+            all.duplicates += selected.duplicates;
+            selecting = selected.temporary.max(selecting);
         }
     }
+    let join: Option<Done<IgnoredAny>> = job.entries(job.above())?.done(JobStep::Join)?;
+    all.peak_memory = all.peak_memory.max(join.and_then(|join| join.peak_memory));
     if by_tasks {
         // All tasks together may have had as much at the same time.
         all.temporary = together;
         // The stages of meshing are kinds of work that go on at the same time.
-        let stages = stages_of(parts, &BEFORE_JOIN).chain(stages_of(parts, &AFTER_JOIN));
-        all.cpu_s_of_tasks = stages.map(|stage| stage.cpu_s).sum();
+        all.cpu_s_of_tasks = cpu_s;
     }
     // Most tiles may have been written after the last part was meshed.
-    all.temporary = all.temporary.max(parts.iter().map(|part| part.stored).sum());
-    for selected in parts.iter().flat_map(|part| &part.selected) {
-        all.selection = all.selection.or(selected.all);
-        all.wanted += selected.wanted;
-        all.duplicates += selected.duplicates;
-        all.temporary = all.temporary.max(selected.temporary);
-    }
-    Ok(all)
+    all.temporary = all.temporary.max(stored).max(selecting);
+    Ok((all, counts))
 }
 
-/// Makes the coarser tiles above the parts, those of `hierarchy`, and returns the root of all.
-fn levels_and_root(
-    run: &WholeRun,
-    job: &Job,
-    joined: &JoinedParts,
-    hierarchy: &Hierarchy,
-) -> crate::Result<(TilesetNode, LevelStats)> {
-    let (tree, mut levels) = (&job.parts.tree, LevelStats::default());
+/// Returns the root of all tiles. `hierarchy` has the coarser ones above the parts.
+fn root_of_all(job: &Job, hierarchy: &Hierarchy) -> Result<TilesetNode> {
     let root = if hierarchy.tiles.is_empty() {
         root_of_part(job, PartIndex::FIRST)?
     } else {
-        let top_of = |part: PartIndex| {
-            let open = job.open(part)?;
-            Child::top(job.directory, &open.store, &open.partition.tree)
-        };
-        levels = levels_over(job, joined, job.above(), hierarchy, true, &top_of)?;
-        let entries = job.entries(job.above())?;
-        let done: Option<Done<IgnoredAny>> = entries.done(JobStep::Levels)?;
-        done.into_iter().flat_map(|done| done.stages).for_each(|stage| run.add_stage(stage));
-        let part_root = &|part: PartIndex| root_of_part(job, part);
-        TilesOfTree { store: &entries.store()?, tree, hierarchy, part_root }.root()?
+        let (store, part_root) = (&job.entries(job.above())?.store()?, &|part: PartIndex| root_of_part(job, part));
+        TilesOfTree { store, tree: &job.parts.tree, hierarchy, part_root }.root()?
     };
-    let root = root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))?;
-    Ok((root, levels))
+    root.ok_or_else(|| Error::Broken("there is no tile to list in tileset.json".into()))
 }
 
 fn root_of_part(job: &Job, part: PartIndex) -> Result<Option<TilesetNode>> {
@@ -193,7 +181,7 @@ impl EachTile for TilesOfParts<'_> {
     }
 }
 
-/// Writes what is beside the tiles. The root of the tileset and the coarser tiles are there if viewers get 3D Tiles.
+/// Writes what is beside the tiles. The `root` of the tileset is there if viewers get 3D Tiles.
 ///
 /// # Errors
 /// Those of the functions in [`crate::publish`].
@@ -201,68 +189,63 @@ fn publish(
     run: &WholeRun,
     job: &Job,
     written: &WrittenTiles,
-    tileset: Option<(TilesetNode, LevelStats)>,
+    root: Option<TilesetNode>,
+    levels: LevelStats,
 ) -> Result<Published> {
     let (plan, directory, tiles) = (job.plan, job.directory, written.tiles);
     let style = &written.appearance.style;
-    let mut warnings = Warnings::default();
-    let (mut raster, mut map_tiles, mut contours, mut terrain) = (None, None, None, None);
+    let mut published = Published { vertex_colors: style.colors.source(), ..Published::default() };
     if let Some(work) = RasterWork::of(plan, &style.frame, tiles)? {
         let stage = ("raster", work.blocks(), "blocks");
         let stats = run.write(JobStep::Raster, stage, |stage| work.write(directory, &|| stage.advance(1)))?;
-        warnings.extend(work.warnings(directory, &stats)?);
-        raster = Some(stats);
+        published.warnings.extend(work.warnings(directory, &stats)?);
+        published.bytes += stats.bytes;
+        published.raster = Some(stats);
         if let Some(work) = MapTileWork::of(plan, work.grid())? {
             let stage = ("map tiles", work.tiles(), "tiles");
             let write = |stage: &Stage| work.write(directory, &|| stage.advance(1));
-            map_tiles = Some(run.write(JobStep::MapTiles, stage, write)?);
+            let stats = run.write(JobStep::MapTiles, stage, write)?;
+            published.bytes += stats.bytes;
+            published.map_tiles = Some(stats);
         }
     }
     if let Some(work) = ContourWork::of(plan, &style.frame, tiles)? {
         let stage = ("contours", work.steps(), "steps");
         let write = |stage: &Stage| work.write(directory, &|steps| stage.advance(steps));
-        contours = Some(run.write(JobStep::Contours, stage, write)?);
+        let stats = run.write(JobStep::Contours, stage, write)?;
+        published.warnings.extend(stats.warning());
+        published.bytes += stats.bytes;
+        published.contours = Some(stats);
     }
-    warnings.extend(contours.as_ref().and_then(ContourStats::warning));
-    let mut exports = Exports::default();
     if let Some(work) = ExportWork::of(plan, &style.frame, tiles, &written.stats)? {
         let stage = ("export", work.reads(), "triangles read");
         let write = |stage: &Stage| work.write(directory, &|triangles| stage.advance(triangles));
-        exports = run.write(JobStep::Exports, stage, write)?;
+        let exports: Exports = run.write(JobStep::Exports, stage, write)?;
+        published.warnings.extend(exports.warnings);
+        published.bytes += exports.files.iter().map(|file| file.bytes).sum::<u64>();
+        published.exports = exports.files;
     }
-    warnings.extend(exports.warnings);
     if let Some(work) = TerrainWork::of(plan, &style.frame, tiles, &written.stats)? {
         let stage = ("terrain", work.steps(), "tiles");
         let write = |stage: &Stage| work.write(directory, &|steps| stage.advance(steps));
-        terrain = Some(run.write(JobStep::Terrain, stage, write)?);
+        let stats: TerrainStats = run.write(JobStep::Terrain, stage, write)?;
+        published.bytes += stats.bytes;
+        published.terrain = Some(stats);
     }
-    let mut classified = ClassifiedInputs::default();
     if plan.options.output.classified {
         let (stage, ground) = (("classify", plan.records, "points"), found_ground(job)?);
         let write = |stage: &Stage| write_all(plan, &ground, directory, &|records| stage.advance(records));
-        classified = run.write(JobStep::Classified, stage, write)?;
+        let classified: ClassifiedInputs = run.write(JobStep::Classified, stage, write)?;
+        published.warnings.extend(classified.warnings);
+        published.bytes += classified.bytes;
     }
-    warnings.extend(classified.warnings);
-    let (root, levels) = tileset.unzip();
-    warnings.extend(levels.and_then(|levels| levels.left_out_warning(plan)));
-    let content = written.side_files(plan, directory, root, &mut warnings)?;
-    let mut bytes = run.write(JobStep::Publish, ("publish", 1, "job"), |stage| {
+    published.levels = levels;
+    published.warnings.extend(levels.left_out_warning(plan));
+    let content = written.side_files(plan, directory, root, &mut published.warnings)?;
+    published.bytes += run.write(JobStep::Publish, ("publish", 1, "job"), |stage| {
         let files = write_side_files(directory, &content, &written.appearance.canvas, tiles)?;
         stage.advance(1);
         Ok(files)
     })?;
-    bytes += exports.files.iter().map(|file| file.bytes).sum::<u64>() + classified.bytes;
-    bytes += raster.map_or(0, |raster| raster.bytes) + map_tiles.map_or(0, |tiles| tiles.bytes);
-    bytes += contours.map_or(0, |lines| lines.bytes) + terrain.as_ref().map_or(0, |tiles| tiles.bytes);
-    Ok(Published {
-        bytes,
-        levels: levels.unwrap_or_default(),
-        raster,
-        map_tiles,
-        contours,
-        exports: exports.files,
-        terrain,
-        vertex_colors: style.colors.source(),
-        warnings,
-    })
+    Ok(published)
 }

@@ -9,7 +9,6 @@ use crate::plan::no_points::no_point_is_left;
 use crate::records::JobStep;
 use crate::run::folder::once;
 use crate::run::job::Job;
-use crate::run::update::outdated::forget_from;
 use crate::{Error, Result};
 use delaunay::geometry::Bounds;
 
@@ -22,7 +21,7 @@ pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<R
     let inputs = parts.new_inputs(reader);
     if inputs.is_empty() {
         if plan.options.updates && job.entries(reader)?.has(JobStep::Read) {
-            forget_from(job, reader, JobStep::Read)?;
+            job.forget_from(reader, JobStep::Read)?;
         }
         return Ok(ReadInputs::default());
     }
@@ -40,11 +39,15 @@ pub(crate) fn read_for(job: &Job, reader: PartIndex, malformed: u64) -> Result<R
 /// # Errors
 /// [`Error::DamagedSteps`] if points are damaged, [`sys::Error::Io`] if what a reader wrote down cannot be read.
 pub(crate) fn points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<PointsOfPart<'a>> {
-    let points = listed_points_of(job, part)?;
-    if job.checks_points && !points.are_whole(&job.folder(part))? {
-        return Err(Error::DamagedSteps);
+    checked(job, part, listed_points_of(job, part)?)
+}
+
+/// Returns these points of `part`, unless they are damaged.
+pub(super) fn checked<'a>(job: &Job, part: PartIndex, points: PointsOfPart<'a>) -> Result<PointsOfPart<'a>> {
+    match job.checks_points && !points.are_whole(&job.folder(part))? {
+        true => Err(Error::DamagedSteps),
+        false => Ok(points),
     }
-    Ok(points)
 }
 
 /// As [`points_of`], whether the points are damaged or not.
@@ -60,13 +63,14 @@ pub(crate) fn listed_points_of<'a>(job: &Job<'a>, part: PartIndex) -> Result<Poi
     Ok(points)
 }
 
-/// Sums up what all inputs held. Returns the sums and the box of the points.
+/// Sums up what all inputs held that are read. Returns the sums and the box of the points.
 ///
 /// # Errors
-/// [`sys::Error::Input`] if too many records are malformed, [`Error::NoTerrain`] or [`sys::Error::Config`] if no point is left,
+/// [`sys::Error::Io`] if a journal cannot be read, [`sys::Error::Input`] if too many records are malformed, [`Error::NoTerrain`] or [`sys::Error::Config`] if no point is left,
 /// [`Error::TooFine`] if no mesh can hold the heights.
-pub(crate) fn sum_up<'a>(job: &Job, read: impl Iterator<Item = &'a ReadInputs>) -> Result<(PointSummary, Bounds<3>)> {
-    let mut read: Vec<ReadInputs> = read.cloned().collect();
+pub(crate) fn sum_up(job: &Job) -> Result<(PointSummary, Bounds<3>)> {
+    let read = job.parts.all().map(|part| job.entries(part)?.known(JobStep::Read));
+    let mut read: Vec<ReadInputs> = read.filter_map(sys::Result::transpose).collect::<sys::Result<_>>()?;
     for inputs in &mut read {
         inputs.renumber_inputs(job.parts);
         inputs.rename_inputs(job.plan);

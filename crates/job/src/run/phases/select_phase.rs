@@ -1,6 +1,7 @@
 //! Finding the points that are vertices, in jobs with `surface = "bare-earth"` or `[output] max_error`. All parts are read before, and none is
 //! meshed.
 
+use crate::Result;
 use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::index::PartIndex;
 use crate::mesh::ground_record::{load_ground, save_ground};
@@ -13,8 +14,7 @@ use crate::plan::job_plan::Plan;
 use crate::records::{JobStep, StepRecord, Store};
 use crate::run::folder::{Folder, done_with};
 use crate::run::job::Job;
-use crate::run::phases::read_phase::{listed_points_of, points_of};
-use crate::{Error, Result};
+use crate::run::phases::read_phase::{checked, listed_points_of, points_of};
 use delaunay::geometry::Site;
 use ground::Ground;
 use selection::{Figures, Selection, select};
@@ -51,7 +51,7 @@ pub(crate) fn selects(plan: &Plan) -> bool {
 /// [`sys::Error::Config`] if the memory does not hold the selection.
 pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     let bound = error_bound(job.plan)?;
-    let key = key_of_all_points(job)?;
+    let key = job.key(|| key_of_all_points(job))?;
     let is_done = |part| Ok(done_with::<IgnoredAny>(job, part, JobStep::Select, key)?.is_some());
     if job.parts.all().map(is_done).collect::<Result<Vec<bool>>>()?.into_iter().all(|is_done| is_done) {
         return know_selection(job);
@@ -108,11 +108,8 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     Ok(waiting.discard()?)
 }
 
-/// Returns the key of the selection, with `--update`: the digest of the points of all parts, and which triangles are asked about. Else 0.
+/// Returns the key of the selection: the digest of the points of all parts, and which triangles are asked about.
 fn key_of_all_points(job: &Job) -> Result<u64> {
-    if !job.plan.options.updates {
-        return Ok(0);
-    }
     job.parts
         .all()
         .try_fold(key_of_lengths(job), |all, part| Ok(all.wrapping_add(listed_points_of(job, part)?.digest())))
@@ -144,15 +141,12 @@ fn key_of_lengths(job: &Job) -> u64 {
     xxh3_64(&HullRule::of_lengths(job.plan).key().to_le_bytes())
 }
 
-/// Returns the key of the mesh of a part, with `--update`: the digest of its vertices, and of the long triangles on ground among them. Else 0.
+/// Returns the key of the mesh of a part: the digest of its vertices, and of the long triangles on ground among them.
 /// Which triangles flow is found with the mesh.
 ///
 /// # Errors
 /// As [`vertices_of`].
 pub(crate) fn key_of_vertices(job: &Job, part: PartIndex) -> Result<u64> {
-    if !job.plan.options.updates {
-        return Ok(0);
-    }
     if !selects(job.plan) {
         return Ok(listed_points_of(job, part)?.digest().wrapping_add(key_of_lengths(job)));
     }
@@ -180,9 +174,5 @@ pub(crate) fn vertices_of<'a>(job: &Job<'a>, part: PartIndex, store: &Store) -> 
         return points_of(job, part);
     }
     let blocks = selected_part(job, part)?.blocks;
-    let points = PointsOfPart::none(job.plan, job.parts, part).selected(store, blocks)?;
-    if job.checks_points && !points.are_whole(&job.folder(part))? {
-        return Err(Error::DamagedSteps);
-    }
-    Ok(points)
+    checked(job, part, PointsOfPart::none(job.plan, job.parts, part).selected(store, blocks)?)
 }

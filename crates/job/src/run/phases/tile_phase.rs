@@ -1,29 +1,24 @@
 //! Steps 5 and 6 for tiles of parts that have waited for other parts.
+//!
+//! A job that does its parts one after the other has a front: the tiles that wait for parts to come. As soon as the parts around a tile are
+//! merged, it is written, and what it needed is given back to the disk, unless the job keeps its mesh. So a job holds no more than its front.
 
-use crate::index::{PartIndex, TileIndex};
-use crate::merge_records::SeamOfTile;
+use crate::index::{NodeIndex, PartIndex, TileIndex};
 use crate::partition::result::Partition;
-use crate::phase::Phase;
-use crate::progress::stage::Stage;
-use crate::records::{FinishedBorder, JobStep, StepRecord, Store};
+use crate::records::{JobStep, StepRecord, Store};
 use crate::run::folder::Folder;
 use crate::run::job::{Job, OpenPart};
-use crate::run::meshed_part::{SomeTiles, WaitedTile};
-use crate::run::phases::join::JoinedParts;
-use crate::run::phases::part_progress::PartProgress;
+use crate::run::meshed_part::MeshedPart;
+use crate::run::phases::join::{JoinedParts, merge_through};
+use crate::run::phases::tile_queue::{TileQueue, TilesBefore};
 use crate::tiles::appearance::TileAppearance;
-use crate::tiles::border_normals::{finish_border_normals, finished_border};
-use crate::tiles::write_tile::{TileStats, write_tile};
-use rayon::prelude::*;
-use std::collections::{BTreeMap, HashMap, HashSet};
-use std::sync::{Arc, Mutex, PoisonError};
-use sys::{Result, interrupt};
-
-/// The tiles of a part that are not written yet, each with the tiles that must be finished before it, if they are known.
-pub(crate) type TilesBefore = BTreeMap<TileIndex, Option<Vec<TileIndex>>>;
+use crate::tiles::write_tile::TileStats;
+use std::collections::{BTreeMap, HashSet};
+use std::sync::Arc;
+use sys::Result;
 
 /// Returns the tiles of a part that are not written yet.
-pub(crate) fn waiting_tiles(OpenPart { partition, tiles, .. }: &OpenPart) -> TilesBefore {
+fn waiting_tiles(OpenPart { partition, tiles, .. }: &OpenPart) -> TilesBefore {
     let mut waiting: TilesBefore = partition.tree.tiles().map(|tile| (tile, None)).collect();
     tiles.with_border.iter().for_each(|(tile, before)| _ = waiting.insert(*tile, Some(before.clone())));
     tiles.written.iter().for_each(|tile| _ = waiting.remove(tile));
@@ -34,167 +29,106 @@ pub(crate) fn waiting_tiles(OpenPart { partition, tiles, .. }: &OpenPart) -> Til
 ///
 /// # Errors
 /// Those of the steps; [`crate::Error::InUse`] if another process has the part.
-pub(crate) fn finish_part(borders: &ForeignBorders, part: PartIndex) -> crate::Result<TileStats> {
-    let progress = PartProgress::of(&borders.job.entries(part)?)?;
-    if progress.has(Phase::Tiles) {
-        return Ok(progress.tiles.stats);
+pub(crate) fn finish_part(job: &Job, joined: &JoinedParts, part: PartIndex) -> crate::Result<TileStats> {
+    if job.entries(part)?.tiles_left()? != Some(0) {
+        write_waiting(job, joined, part, &HashSet::new(), None)?;
     }
-    let session = BorderSession::open(borders, part, progress.tiles_left())?;
-    // What another process has written since is in the journal that is locked now.
-    let (mut all, mut waiting) = (session.open.tiles.stats, waiting_tiles(&session.open));
-    if !waiting.is_empty() {
-        let written = session.write_ready(&mut waiting, &HashSet::new())?;
-        all += written.stats;
-        session.finish(written)?;
-    }
-    Ok(all)
+    Ok(job.entries(part)?.tiles()?.stats)
 }
 
-/// A part whose waiting tiles this process writes.
-pub(crate) struct BorderSession<'a> {
-    borders: &'a ForeignBorders<'a>,
-    folder: Folder,
-    open: Arc<OpenPart>,
+/// Writes those of the tiles of `part` that have waited which no `open` tile keeps waiting. If the mesh is not kept, gives up what they needed;
+/// the `outer` tiles of the part touch others. Returns the tiles that still wait, and the bytes that the store of the part kept before and keeps
+/// now.
+///
+/// # Errors
+/// Those of the steps; [`crate::Error::InUse`] if another process has the part.
+fn write_waiting(
+    job: &Job,
+    joined: &JoinedParts,
     part: PartIndex,
-    stage: Stage,
+    open: &HashSet<TileIndex>,
+    outer: Option<&[TileIndex]>,
+) -> crate::Result<(TilesBefore, [u64; 2])> {
+    let folder = Folder::open(job, part, 0)?;
+    // What was opened before may be from before another process wrote here, and the store grows from now on.
+    job.close(part);
+    let opened = job.open(part)?;
+    job.close(part);
+    let (mut waiting, before) = (waiting_tiles(&opened), folder.store.bytes());
+    if waiting.is_empty() {
+        return Ok((waiting, [before; 2]));
+    }
+    let stage = job.progress.stage("write tiles", waiting.len() as u64, "tiles");
+    let partition = &opened.partition;
+    let queue = TileQueue::after_merges(job, &folder, partition, &stage, joined, open, outer.is_some());
+    rayon::scope(|scope| queue.push_waiting(scope, &waiting));
+    let (mut some, _) = queue.finish(&mut Vec::new())?;
+    // The journal knows the others.
+    some.with_border.retain(|(tile, _)| waiting.get(tile) == Some(&None));
+    some.with_border.iter().for_each(|(tile, before)| _ = waiting.insert(*tile, Some(before.clone())));
+    some.written.iter().for_each(|tile| _ = waiting.remove(tile));
+    if let Some(outer) = outer.filter(|_| waiting.is_empty()) {
+        free_all_but(outer, &folder.store, partition)?;
+    }
+    folder.record(JobStep::Tiles, some, vec![stage.finish()])?;
+    Ok((waiting, [before, folder.store.bytes()]))
 }
 
-impl<'a> BorderSession<'a> {
-    /// Opens the folder of `part`, which is `directory`, to write some of `tiles` tiles.
-    ///
-    /// # Errors
-    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on the folder, [`crate::Error::InUse`] if another process has the part.
-    pub(crate) fn open(
-        borders: &'a ForeignBorders<'a>,
-        part: PartIndex,
-        tiles: usize,
-    ) -> crate::Result<BorderSession<'a>> {
-        let job = borders.job;
-        let folder = Folder::open(job, part, 0)?;
-        // What was opened before may be from before another process wrote here, and the store grows from now on.
-        job.close(part);
-        let open = job.open(part)?;
-        job.close(part);
-        let stage = job.progress.stage("write tiles", tiles as u64, "tiles");
-        Ok(BorderSession { borders, folder, open, part, stage })
-    }
-
-    pub(crate) fn store(&self) -> &Store {
-        &self.folder.store
-    }
-
-    pub(crate) fn partition(&self) -> &Partition {
-        &self.open.partition
-    }
-
-    fn seam(&self, tile: TileIndex) -> Result<SeamOfTile> {
-        let ForeignBorders { job, joined, .. } = *self.borders;
-        joined.seam_of(job, self.store(), &self.partition().tree, tile)
-    }
-
-    /// Finishes the borders of those of the `waiting` tiles that are not `open`, because no merge can change them any more. Writes those whose
-    /// neighbours are not open either, and takes them away.
-    ///
-    /// # Errors
-    /// Those of [`finish_border_normals`] and [`write_tile`].
-    pub(crate) fn write_ready(&self, waiting: &mut TilesBefore, open: &HashSet<TileIndex>) -> Result<SomeTiles> {
-        let finished = waiting.iter().filter(|(tile, before)| before.is_none() && !open.contains(tile));
-        let finished: Vec<TileIndex> = finished.map(|(tile, _)| *tile).collect();
-        let mut with_border = self.finish_borders(&finished)?;
-        with_border.iter().for_each(|(tile, before)| _ = waiting.insert(*tile, Some(before.clone())));
-        let is_ready = |before: &Vec<TileIndex>| before.iter().all(|other| !open.contains(other));
-        let ready: Vec<(TileIndex, Vec<TileIndex>)> =
-            waiting.iter().filter_map(|(tile, before)| Some((*tile, before.clone().filter(is_ready)?))).collect();
-        ready.iter().for_each(|(tile, _)| _ = waiting.remove(tile));
-        with_border.retain(|(tile, _)| waiting.contains_key(tile));
-        let written: Vec<TileIndex> = ready.iter().map(|(tile, _)| *tile).collect();
-        let each = self.write_each(&written)?;
-        let ForeignBorders { job, joined, .. } = *self.borders;
-        let waited = |((tile, neighbours), &stats): (&(TileIndex, Vec<TileIndex>), &TileStats)| {
-            Ok(WaitedTile { tile: *tile, stats, key: joined.key_of_tile(job, *tile)?, neighbours: neighbours.clone() })
-        };
-        let waited = match job.plan.options.updates {
-            true => ready.par_iter().zip(&each).map(waited).collect::<Result<_>>()?,
-            false => Vec::new(),
-        };
-        Ok(SomeTiles { stats: each.into_iter().sum(), written, with_border, waited })
-    }
-
-    /// Finishes the borders of `tiles`. Returns each with the tiles that must be finished before it can be written.
-    fn finish_borders(&self, tiles: &[TileIndex]) -> Result<Vec<(TileIndex, Vec<TileIndex>)>> {
-        let (tree, style) = (&self.partition().tree, &self.borders.joined.appearance.style);
-        let finish = |&tile: &TileIndex| {
-            interrupt::check()?;
-            Ok((tile, finish_border_normals(self.store(), tree, style, tile, &self.seam(tile)?)?))
-        };
-        tiles.par_iter().map(finish).collect()
-    }
-
-    /// Writes `tiles`, whose borders are finished. Returns the figures of each.
-    fn write_each(&self, tiles: &[TileIndex]) -> Result<Vec<TileStats>> {
-        let TileAppearance { style, canvas } = &*self.borders.joined.appearance;
-        let border_of = |other: TileIndex| match other.part() == self.part {
-            true => FinishedBorder::load(self.store(), other),
-            false => self.borders.of(other),
-        };
-        let write = |&tile: &TileIndex| {
-            interrupt::check()?;
-            let Folder { directory, store, journal, .. } = &self.folder;
-            let (stats, files) = write_tile(directory, store, style, canvas, tile, &self.seam(tile)?, &border_of)?;
-            journal.add_files(&files);
-            self.stage.advance(1);
-            Ok(stats)
-        };
-        tiles.par_iter().map(write).collect()
-    }
-
-    /// Records what is written, and ends the session. Returns the bytes that the part's store keeps.
-    ///
-    /// # Errors
-    /// [`sys::Error::Io`].
-    pub(crate) fn finish(self, some: SomeTiles) -> Result<u64> {
-        self.folder.record(JobStep::Tiles, some, vec![self.stage.finish()])?;
-        Ok(self.folder.store.bytes())
-    }
+/// Gives up what no phase needs any more once all tiles of a part are written: all but the borders of its `outer` tiles, which other parts may
+/// still ask for.
+fn free_all_but(outer: &[TileIndex], store: &Store, Partition { tree, .. }: &Partition) -> Result<()> {
+    let mut inner = tree.tiles().filter(|tile| !outer.contains(tile));
+    inner.try_for_each(|tile| store.free(StepRecord::FinishedBorder(tile)))?;
+    (1..tree.nodes.len()).map(NodeIndex::new).try_for_each(|node| store.free(StepRecord::Seam(node)))
 }
 
-/// How many borders of other parts stay in memory, some ten kilobytes each.
-const MOST_KNOWN: usize = 1000;
-
-/// Finished borders of tiles of other parts. Those that are not stored yet are computed: a part's folder has one writer.
-pub(crate) struct ForeignBorders<'a> {
+/// The tiles that wait for parts to come.
+pub(crate) struct WaitingTiles<'a> {
     job: &'a Job<'a>,
-    joined: &'a JoinedParts,
-    known: Mutex<HashMap<TileIndex, FinishedBorder>>,
+    appearance: Arc<TileAppearance>,
+    /// The tiles that merges may still change.
+    open: HashSet<TileIndex>,
+    /// The parts with tiles that are not written yet.
+    waiting: BTreeMap<PartIndex, (TilesBefore, MeshedPart)>,
 }
 
-impl<'a> ForeignBorders<'a> {
-    /// Returns the borders of a job whose parts are joined as far as `joined` tells.
-    pub(crate) fn new(job: &'a Job<'a>, joined: &'a JoinedParts) -> ForeignBorders<'a> {
-        ForeignBorders { job, joined, known: Mutex::default() }
+impl<'a> WaitingTiles<'a> {
+    /// Returns the front before any part is done.
+    pub(crate) fn new(job: &'a Job<'a>, appearance: Arc<TileAppearance>) -> WaitingTiles<'a> {
+        WaitingTiles { job, appearance, open: HashSet::new(), waiting: BTreeMap::new() }
     }
 
-    fn of(&self, tile: TileIndex) -> Result<FinishedBorder> {
-        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(border) = known().get(&tile) {
-            return Ok(border.clone());
+    /// Takes `part`, which is `meshed`: merges what is complete now, and writes the tiles that have waited for that. Corrects `stored`, the bytes
+    /// that all parts so far keep on the disk.
+    ///
+    /// # Errors
+    /// Those of the steps.
+    pub(crate) fn pass(&mut self, part: PartIndex, meshed: MeshedPart, stored: &mut u64) -> crate::Result<()> {
+        self.open.extend(&meshed.open);
+        self.waiting.insert(part, (waiting_tiles(&*self.job.open(part)?), meshed));
+        for tile in merge_through(self.job, part)? {
+            self.open.remove(&tile);
         }
-        let border = self.find(tile)?;
-        let mut known = known();
-        if known.len() >= MOST_KNOWN {
-            known.clear();
-        }
-        known.insert(tile, border.clone());
-        Ok(border)
+        self.write_ready_tiles(stored)
     }
 
-    fn find(&self, tile: TileIndex) -> Result<FinishedBorder> {
-        let OpenPart { store, partition, .. } = &*self.job.open(tile.part())?;
-        // Another machine may be writing it. But what a written tile needed may be gone, and then it is whole.
-        if store.has_whole(StepRecord::FinishedBorder(tile))? {
-            return FinishedBorder::load(store, tile);
+    fn write_ready_tiles(&mut self, stored: &mut u64) -> crate::Result<()> {
+        let WaitingTiles { job, appearance, open, waiting } = self;
+        let is_due = |(tile, before): (&TileIndex, &Option<Vec<TileIndex>>)| {
+            let all = before.iter().flatten().chain([tile]);
+            all.into_iter().all(|tile| !open.contains(tile))
+        };
+        let mut due = waiting.iter_mut().filter(|(_, (tiles, _))| tiles.iter().any(is_due)).peekable();
+        if due.peek().is_some() {
+            let joined = JoinedParts::so_far(job, appearance.clone())?;
+            for (&part, (tiles, meshed)) in due {
+                let outer = (!meshed.is_kept).then_some(meshed.open.as_slice());
+                let (waiting, [before, after]) = write_waiting(job, &joined, part, open, outer)?;
+                *stored = (*stored + after).saturating_sub(before);
+                *tiles = waiting;
+            }
         }
-        let seam = self.joined.seam_of(self.job, store, &partition.tree, tile)?;
-        finished_border(store, &partition.tree, &self.joined.appearance.style, tile, &seam)
+        self.waiting.retain(|_, (tiles, _)| !tiles.is_empty());
+        Ok(())
     }
 }

@@ -7,16 +7,17 @@ use crate::mesh::merge::merge_frontiers;
 use crate::partition::point_file::PointFiles;
 use crate::partition::result::Partition;
 use crate::partition::tree::{Cell, NodeKind};
-use crate::plan::budget::merge_memory;
+use crate::plan::budget::{memory_for_merges, merge_memory};
 use crate::preflight::stage_costs::triangulated_share;
 use crate::progress::activity::Activity;
 use crate::progress::stage::Stage;
 use crate::run::folder::Folder;
 use crate::run::job::Job;
-use crate::run::phases::postponed_merges::PostponedMerges;
 use crate::run::phases::tile_queue::TileQueue;
 use crate::tiles::dependencies::FinishedTile;
 use rayon::Scope;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use sys::{Error, Result, fault, interrupt};
 
 /// Walks the tree.
@@ -29,8 +30,9 @@ pub(crate) struct TreeWalk<'a> {
     pub(crate) activity: &'a Activity,
     /// Takes the tiles that are finished.
     pub(crate) queue: &'a TileQueue<'a>,
-    /// Takes the nodes that do not fit the memory.
-    pub(crate) unmerged: PostponedMerges,
+    /// The merge nodes that do not fit the memory, with the most sites that each may have to merge. The walk goes on without them, so that one
+    /// message can name a limit that suffices for all nodes of the part.
+    pub(crate) unmerged: Mutex<BTreeMap<NodeIndex, u64>>,
 }
 
 impl<'a> TreeWalk<'a> {
@@ -71,7 +73,7 @@ impl<'a> TreeWalk<'a> {
         let (plan, threads) = (self.job.plan, self.job.threads);
         let store = &self.folder.store;
         let below = self.partition.tree.merged_by(node);
-        if below.iter().any(|&child| self.unmerged.sites(child).is_some()) {
+        if below.iter().any(|child| self.unmerged().contains_key(child)) {
             return self.leave_out(node, &below);
         }
         let memory = merge_memory(&plan.options, node == NodeIndex::ROOT, threads);
@@ -90,11 +92,36 @@ impl<'a> TreeWalk<'a> {
 
     /// Notes that `node` is not merged. It never passes up more sites than come from `below`.
     fn leave_out(&self, node: NodeIndex, below: &[NodeIndex]) -> crate::Result<()> {
-        let sites = |child: &NodeIndex| match self.unmerged.sites(*child) {
-            Some(sites) => Ok(sites),
+        let sites = |child: &NodeIndex| match self.unmerged().get(child) {
+            Some(sites) => Ok(*sites),
             None => Frontier::count(&self.folder.store, *child),
         };
-        self.unmerged.add(node, below.iter().map(sites).sum::<Result<u64>>()?);
+        let sites = below.iter().map(sites).sum::<Result<u64>>()?;
+        self.unmerged().insert(node, sites);
         Ok(())
+    }
+
+    fn unmerged(&self) -> MutexGuard<'_, BTreeMap<NodeIndex, u64>> {
+        self.unmerged.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Checks that no node was left out.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] names the limit with which all of them fit.
+    pub(crate) fn check_memory(&self) -> Result<()> {
+        let (nodes, options) = (self.unmerged(), &self.job.plan.options);
+        let Some(most) = nodes.values().max() else { return Ok(()) };
+        // If the mesh proves too fine for the lattice, that of a coarser one has somewhat more to merge.
+        let more = if options.input.resolution.step().is_none() { 10 } else { 0 };
+        let needs = nodes.iter().map(|(node, sites)| (*node == NodeIndex::ROOT, sites + sites / 100 * more));
+        Err(Error::Memory(format!(
+            "{most} sites lie on circles or triangles that no tile can decide alone, and [limits] memory = \"{}\" has no room to join \
+             them on {} threads; set memory = \"{}\", which is enough for all that is left, or less together with fewer [limits] \
+             threads",
+            options.limits.memory,
+            options.threads(),
+            memory_for_merges(options, needs)
+        )))
     }
 }

@@ -6,53 +6,53 @@ use crate::options::JobOptions;
 use crate::phase::{Phase, PhaseTasks};
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::Fingerprint;
-use crate::records::JobStep;
 use crate::run::finished::{InPlace, is_rest, results_in_place};
-use crate::run::phases::part_progress::PartProgress;
-use crate::run::planned_job::{PlannedJob, planned};
+use crate::run::part_entries::PartEntries;
+use crate::run::planned_job::{PlannedJob, is_planned};
 use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use sys::Result;
 use sys::threads::on_threads;
 
 /// What is done of a planned job.
 pub(crate) struct JobProgressByPart<'a> {
     pub(crate) job: &'a PlannedJob,
-    pub(crate) parts: Vec<PartProgress>,
-    is_joined: bool,
+    /// The parts that are asked about.
+    pub(crate) parts: BTreeMap<PartIndex, PartEntries>,
 }
 
 impl<'a> JobProgressByPart<'a> {
     /// Reads the journals of all parts.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a journal.
+    /// [`sys::Error::Io`] on a journal.
     pub(crate) fn of(job: &'a PlannedJob) -> Result<JobProgressByPart<'a>> {
-        JobProgressByPart::of_parts(job, |_| true)
+        JobProgressByPart::of_parts(job, job.parts.all())
     }
 
-    /// Reads the journals of the `wanted` parts. Nothing of the others counts as done.
+    /// Reads the journals of these parts. Nothing is missing of the others.
     ///
     /// # Errors
-    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a journal.
-    pub(crate) fn of_parts(job: &'a PlannedJob, wanted: impl Fn(PartIndex) -> bool) -> Result<JobProgressByPart<'a>> {
-        let part = |part| match wanted(part) {
-            true => PartProgress::of(&job.entries(part)?),
-            false => Ok(PartProgress::default()),
-        };
-        let parts = job.parts.all().map(part).collect::<Result<_>>()?;
-        let is_joined = job.entries(job.parts.tree.part)?.has(JobStep::Join);
-        Ok(JobProgressByPart { job, parts, is_joined })
+    /// [`sys::Error::Io`] on a journal.
+    pub(crate) fn of_parts(
+        job: &'a PlannedJob,
+        parts: impl IntoIterator<Item = PartIndex>,
+    ) -> Result<JobProgressByPart<'a>> {
+        let parts = parts.into_iter().map(|part| Ok((part, job.entries(part)?))).collect::<Result<_>>()?;
+        Ok(JobProgressByPart { job, parts })
     }
 
     /// Tells whether `phase`, which has one task, is done.
-    pub(crate) fn is_done(&self, phase: Phase) -> bool {
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] or [`sys::Error::Broken`] on a journal.
+    pub(crate) fn is_done(&self, phase: Phase) -> Result<bool> {
         match phase {
-            Phase::Plan => true,
-            Phase::Select => self.parts.iter().all(|part| part.selected.is_some()),
-            Phase::Join => self.is_joined,
-            _ => false,
+            Phase::Plan => Ok(true),
+            Phase::Select => Ok(self.missing(phase, 1)?.is_empty()),
+            Phase::Join => self.job.entries(self.job.parts.tree.part)?.has_phase(phase),
+            _ => Ok(false),
         }
     }
 
@@ -62,35 +62,43 @@ impl<'a> JobProgressByPart<'a> {
     }
 
     /// Returns the parts of `phase` that are missing, each with the number of the task that it falls to, of `tasks`.
-    pub(crate) fn missing(&self, phase: Phase, tasks: u32) -> Vec<(PartIndex, u32)> {
-        let mut dealt = deal(&self.job.plan, &self.job.parts, phase, tasks);
-        dealt.retain(|(part, _)| !self.parts[part.get()].has(phase));
-        dealt
+    ///
+    /// # Errors
+    /// [`sys::Error::Broken`] if a journal is not understood.
+    pub(crate) fn missing(&self, phase: Phase, tasks: u32) -> Result<Vec<(PartIndex, u32)>> {
+        let mut missing = Vec::new();
+        for (part, task) in deal(&self.job.plan, &self.job.parts, phase, tasks) {
+            if let Some(entries) = self.parts.get(&part)
+                && !entries.has_phase(phase)?
+            {
+                missing.push((part, task));
+            }
+        }
+        Ok(missing)
     }
 
     /// Returns the tasks of `phase` that are missing, of `tasks`.
-    pub(crate) fn missing_tasks(&self, phase: Phase, tasks: u32) -> Vec<u32> {
-        match phase.is_by_part() {
-            true => numbers(&self.missing(phase, tasks)),
-            false if self.is_done(phase) => Vec::new(),
-            false => vec![1],
+    ///
+    /// # Errors
+    /// As [`JobProgressByPart::is_done`].
+    pub(crate) fn missing_tasks(&self, phase: Phase, tasks: u32) -> Result<Vec<u32>> {
+        if phase.is_by_part() {
+            let numbers: BTreeSet<u32> = self.missing(phase, tasks)?.into_iter().map(|(_, task)| task).collect();
+            return Ok(numbers.into_iter().collect());
         }
+        Ok(if self.is_done(phase)? { Vec::new() } else { vec![1] })
     }
 
-    /// Checks that `phase` is complete, as far as it is about the `wanted` parts.
+    /// Checks that `phase` is complete.
     ///
     /// # Errors
     /// [`crate::Error::TooEarly`] names the tasks that are missing.
-    pub(crate) fn require(&self, phase: Phase, tasks: u32, wanted: impl Fn(PartIndex) -> bool) -> crate::Result<()> {
-        let mut missing = self.missing(phase, tasks);
-        missing.retain(|(part, _)| wanted(*part));
-        let numbers = if phase.is_by_part() { numbers(&missing) } else { self.missing_tasks(phase, tasks) };
-        if numbers.is_empty() { Ok(()) } else { Err(too_early(phase, &numbers, phase.tasks(tasks))) }
+    pub(crate) fn require(&self, phase: Phase, tasks: u32) -> crate::Result<()> {
+        match self.missing_tasks(phase, tasks)?.as_slice() {
+            [] => Ok(()),
+            missing => Err(too_early(phase, missing, phase.tasks(tasks))),
+        }
     }
-}
-
-fn numbers(missing: &[(PartIndex, u32)]) -> Vec<u32> {
-    missing.iter().map(|(_, task)| *task).collect::<BTreeSet<u32>>().into_iter().collect()
 }
 
 /// Returns the error of a task that came before `phase` was complete: its `missing` tasks, of `count`.
@@ -117,17 +125,12 @@ pub(crate) fn not_planned() -> crate::Error {
 pub(crate) fn missing_tasks(options: &JobOptions, tasks: u32) -> Result<Vec<PhaseTasks>> {
     let directory = JobDirectory::new(&options.output.directory);
     if let InPlace::ThisJob(_) = results_in_place(&directory, options, 0)? {
-        let has_rest = is_rest(&directory)?;
-        return Ok(of_each(options, tasks, |phase| publish_alone(phase, has_rest)));
+        return publish_alone(options, tasks, is_rest(&directory)?);
     }
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    let known = planned(&directory, 0)?;
-    let is_same = known.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
-    // One process may have begun a small job, which has no tasks.
-    if is_same && PlannedJob::open(&directory, options, 0)?.is_some() {
-        missing_tasks_of_planned(options, tasks)
-    } else {
-        Ok(PhaseTasks::all(tasks, options.leaves_points_out()))
+    match is_planned(&directory, options, &fingerprint, 0)? {
+        true => missing_tasks_of_planned(options, tasks),
+        false => Ok(PhaseTasks::all(tasks, options.leaves_points_out())),
     }
 }
 
@@ -142,17 +145,19 @@ pub(crate) fn missing_tasks_of_planned(options: &JobOptions, tasks: u32) -> Resu
     match planned.filter(|job| !job.is_complete) {
         Some(job) => {
             let progress = JobProgressByPart::of(&job)?;
-            Ok(of_each(options, tasks, |phase| progress.missing_tasks(phase, tasks)))
+            of_each(options, tasks, |phase| progress.missing_tasks(phase, tasks))
         }
-        None => Ok(of_each(options, tasks, |phase| publish_alone(phase, true))),
+        None => publish_alone(options, tasks, true),
     }
 }
 
-fn publish_alone(phase: Phase, is_missing: bool) -> Vec<u32> {
-    if phase == Phase::Publish && is_missing { vec![1] } else { Vec::new() }
+/// Returns all phases, of which none is missing but `publish`, and that only if it `is_missing`.
+fn publish_alone(options: &JobOptions, tasks: u32, is_missing: bool) -> Result<Vec<PhaseTasks>> {
+    let missing = |phase| if phase == Phase::Publish && is_missing { vec![1] } else { Vec::new() };
+    of_each(options, tasks, |phase| Ok(missing(phase)))
 }
 
-fn of_each(options: &JobOptions, tasks: u32, missing: impl Fn(Phase) -> Vec<u32>) -> Vec<PhaseTasks> {
-    let of_phase = |phase: Phase| PhaseTasks { phase, count: phase.tasks(tasks), missing: missing(phase) };
+fn of_each(options: &JobOptions, tasks: u32, missing: impl Fn(Phase) -> Result<Vec<u32>>) -> Result<Vec<PhaseTasks>> {
+    let of_phase = |phase: Phase| Ok(PhaseTasks { phase, count: phase.tasks(tasks), missing: missing(phase)? });
     Phase::of_job(options.leaves_points_out()).map(of_phase).collect()
 }

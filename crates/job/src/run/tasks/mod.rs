@@ -60,7 +60,7 @@ fn publish(directory: &JobDirectory, options: &JobOptions, run: RunOptions, task
         if !job.is_complete {
             let progress = JobProgressByPart::of(&job)?;
             let mut before = Phase::of_job(options.leaves_points_out()).filter(|phase| *phase != Phase::Publish);
-            before.try_for_each(|phase| progress.require(phase, task.count, |_| true))?;
+            before.try_for_each(|phase| progress.require(phase, task.count))?;
         }
     }
     run_until_it_fits(options, run, is_by_tasks)

@@ -19,13 +19,15 @@ use crate::run::phases::level_phase::levels_of_part;
 use crate::run::phases::mesh_phase::mesh_one;
 use crate::run::phases::read_phase::{read_for, sum_up};
 use crate::run::phases::select_phase::{know_selection, select_vertices, selects};
-use crate::run::phases::tile_phase::{ForeignBorders, finish_part};
+use crate::run::phases::tile_phase::finish_part;
 use crate::run::planned_job::PlannedJob;
 use crate::run::single_process;
 use crate::run::tasks::dealing::deal;
-use crate::run::tasks::missing::{JobProgressByPart, not_planned, too_early};
+use crate::run::tasks::missing::{JobProgressByPart, not_planned};
+use crate::tiles::write_tile::TileStats;
 use crate::{Error, Result};
 use delaunay_gpu::triangulator::Triangulator;
+use std::collections::HashSet;
 use sys::threads::on_threads;
 use tiles::options::OutputFormat;
 
@@ -41,7 +43,11 @@ pub(crate) fn work_on_parts(
     task: Task,
 ) -> Result<(u64, Option<String>)> {
     let directory = &JobDirectory::new(&options.output.directory);
-    let lock = share(directory, run.submission)?.ok_or_else(not_planned)?;
+    let has_journal = entries(directory.job())?.contains(&directory.journal());
+    if !has_journal && !single_process::is_noted(directory, run.submission)? {
+        return Err(not_planned());
+    }
+    let lock = Lock::share(directory.job())?;
     if !lock.is_real() {
         run.progress.note(NO_LOCKS);
     }
@@ -80,14 +86,6 @@ fn parts_of(job: &PlannedJob, phase: Phase, task: Task) -> Vec<PartIndex> {
     dealt.into_iter().filter(|(_, number)| *number == task.number).map(|(part, _)| part).collect()
 }
 
-/// Shares the lock of the job directory; `None` if there is none.
-fn share(directory: &JobDirectory, submission: u64) -> Result<Option<Lock>> {
-    let journal = directory.journal();
-    let is_there = entries(directory.job())?.contains(&journal);
-    let is_left = || single_process::is_noted(directory, submission);
-    if is_there || is_left()? { Lock::share(directory.job()).map(Some) } else { Ok(None) }
-}
-
 /// A task of a phase that is done by parts, or of join.
 struct PartTask<'a> {
     job: &'a PlannedJob,
@@ -120,15 +118,58 @@ impl PartTask<'_> {
             is_task: true,
         };
         let job = &Job::new(process, &self.job.plan, &self.job.parts);
+        self.require_others(mine)?;
+        if self.phase > Phase::Select {
+            know_selection(job)?;
+        }
         match self.phase {
             Phase::Read => self.each(mine, |part| read_for(job, part, 0).map(|_| ())),
-            Phase::Select => self.select(job),
-            Phase::Mesh => self.mesh(job, mine),
-            Phase::Join => self.join(job),
-            Phase::Tiles => self.tiles(job, mine),
-            Phase::Levels => self.levels(job, mine),
+            Phase::Select => sum_up(job).and_then(|_| select_vertices(job)),
+            Phase::Mesh => {
+                let appearance = early_appearance(job)?;
+                self.each(mine, |part| mesh_one(job, part, appearance.as_ref(), None).map(|_| ()))
+            }
+            Phase::Join => join_parts(job),
+            Phase::Tiles => {
+                let joined = JoinedParts::open(job)?;
+                self.each(mine, |part| finish_part(job, &joined, part).map(|_| ()))
+            }
+            Phase::Levels => {
+                let joined = JoinedParts::open(job)?;
+                let written = self.parts_needed(mine).into_iter().map(|part| Ok(job.entries(part)?.tiles()?.stats));
+                let has_tileset = wants_tileset(job.plan, &written.sum::<Result<TileStats>>()?);
+                self.each(mine, |part| levels_of_part(job, &joined, part, has_tileset).map(|_| ()))
+            }
             Phase::Plan | Phase::Publish => Ok(()),
         }
+    }
+
+    /// Checks that the phases are complete that this one needs, as far as it needs them.
+    fn require_others(&self, mine: &[PartIndex]) -> Result<()> {
+        let needed: &[Phase] = match self.phase {
+            Phase::Select => &[Phase::Read],
+            Phase::Mesh if selects(&self.job.plan) => &[Phase::Select],
+            Phase::Mesh => &[Phase::Read],
+            Phase::Join => &[Phase::Read, Phase::Mesh],
+            Phase::Tiles => &[Phase::Join],
+            Phase::Levels => &[Phase::Join, Phase::Tiles],
+            Phase::Plan | Phase::Read | Phase::Publish => &[],
+        };
+        let progress = JobProgressByPart::of_parts(self.job, self.parts_needed(mine))?;
+        needed.iter().try_for_each(|phase| progress.require(*phase, self.task.count))
+    }
+
+    /// Returns the parts whose earlier phases this one needs.
+    fn parts_needed(&self, mine: &[PartIndex]) -> Vec<PartIndex> {
+        let PlannedJob { plan, parts, .. } = self.job;
+        let readers: HashSet<PartIndex> = mine.iter().flat_map(|&part| parts.readers_of(part)).collect();
+        let is_needed = |part: &PartIndex| match self.phase {
+            Phase::Mesh => selects(plan) || readers.contains(part),
+            // With one file, the size of all tiles together tells whether it holds them.
+            Phase::Levels => plan.options.output.format == OutputFormat::Glb || mine.contains(part),
+            phase => matches!(phase, Phase::Select | Phase::Join),
+        };
+        parts.all().filter(is_needed).collect()
     }
 
     /// Does `work` for each of `mine`. A part that another process has is left to it.
@@ -144,57 +185,5 @@ impl PartTask<'_> {
             }
         }
         in_use.map_or(Ok(()), Err)
-    }
-
-    fn select(&self, job: &Job) -> Result<()> {
-        let progress = JobProgressByPart::of(self.job)?;
-        progress.require(Phase::Read, self.task.count, |_| true)?;
-        sum_up(job, progress.parts.iter().filter_map(|part| part.read.as_ref()))?;
-        select_vertices(job)
-    }
-
-    fn mesh(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
-        let readers: Vec<PartIndex> = mine.iter().flat_map(|&part| job.parts.readers_of(part)).collect();
-        let is_reader = |part: PartIndex| readers.contains(&part);
-        if selects(job.plan) {
-            // Of all parts: until then, the points of each are needed.
-            JobProgressByPart::of(self.job)?.require(Phase::Select, self.task.count, |_| true)?;
-            know_selection(job)?;
-        } else {
-            JobProgressByPart::of_parts(self.job, is_reader)?.require(Phase::Read, self.task.count, is_reader)?;
-        }
-        let appearance = early_appearance(job)?;
-        self.each(mine, |part| mesh_one(job, part, appearance.as_ref(), None).map(|_| ()))
-    }
-
-    fn join(&self, job: &Job) -> Result<()> {
-        let progress = JobProgressByPart::of(self.job)?;
-        [Phase::Read, Phase::Mesh]
-            .into_iter()
-            .try_for_each(|phase| progress.require(phase, self.task.count, |_| true))?;
-        know_selection(job)?;
-        join_parts(job)
-    }
-
-    fn tiles(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
-        let joined = self.joined(job)?;
-        let borders = &ForeignBorders::new(job, &joined);
-        self.each(mine, |part| finish_part(borders, part).map(|_| ()))
-    }
-
-    fn levels(&self, job: &Job, mine: &[PartIndex]) -> Result<()> {
-        // With this format, the size of all tiles together tells whether one file holds them.
-        let needs_all = job.plan.options.output.format == OutputFormat::Glb;
-        let needs = |part: PartIndex| needs_all || mine.contains(&part);
-        let progress = JobProgressByPart::of_parts(self.job, needs)?;
-        let joined = self.joined(job)?;
-        progress.require(Phase::Tiles, self.task.count, needs)?;
-        let has_tileset = wants_tileset(job.plan, &progress.parts.iter().map(|part| part.tiles.stats).sum());
-        self.each(mine, |part| levels_of_part(job, &joined, part, has_tileset).map(|_| ()))
-    }
-
-    fn joined(&self, job: &Job) -> Result<JoinedParts> {
-        know_selection(job)?;
-        JoinedParts::open(job)?.ok_or_else(|| too_early(Phase::Join, &[1], 1))
     }
 }

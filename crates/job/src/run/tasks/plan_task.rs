@@ -8,16 +8,14 @@ use crate::options::{JobOptions, RunOptions};
 use crate::partition::parts::Parts;
 use crate::plan::budget::workers;
 use crate::plan::fingerprint::{Fingerprint, JobHeader};
-use crate::plan::job_plan::Plan;
 use crate::preflight::check::require_memory_and_disk;
 use crate::preflight::contour_estimate::ContourSample;
 use crate::progress::clock::JobClock;
 use crate::progress::stage::JobProgress;
-use crate::run::attempt::read_earlier;
 use crate::run::earlier_run::{EarlierRun, PlanOrigin, start};
 use crate::run::finished::known_submission;
 use crate::run::phases::plan_phase::{find_plan, note_skipped, write_plan};
-use crate::run::planned_job::planned;
+use crate::run::planned_job::is_planned;
 use crate::run::single_process;
 use std::time::SystemTime;
 use sys::threads::on_threads;
@@ -31,17 +29,18 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     let begun = SystemTime::now();
     check_nothing_in_the_way(directory)?;
     let fingerprint = on_threads(workers(options, 0)?, || Fingerprint::of(options))?;
-    if is_planned(directory, &fingerprint, run.submission)? {
+    // Nobody starts it over meanwhile.
+    let lock = if exists(&directory.journal())? { Some(Lock::share(directory.job())?) } else { None };
+    if lock.is_some() && is_planned(directory, options, &fingerprint, run.submission)? {
         return Ok(Some("the job is planned already".into()));
     }
+    drop(lock);
     check_results_are_ours(directory, options.output.page)?;
     let _lock = Lock::take(directory.job())?;
-    let mut earlier = read_earlier(directory, run)?;
-    if let Some(earlier) = earlier.as_mut()
-        && let Some(what) = modified_inputs(earlier, &fingerprint)
-    {
+    let mut earlier = EarlierRun::read(directory, run)?;
+    if let Some(what) = earlier.as_ref().and_then(|earlier| modified_inputs(earlier, &fingerprint)) {
         run.progress.note(&format!("changed since the interrupted run: {what}; starting over"));
-        earlier.forget();
+        earlier = None;
     }
     let coarsening = earlier.as_ref().and_then(|earlier| earlier.coarsening(&fingerprint)).unwrap_or_default();
     let submission = run.submission.max(known_submission(directory)?);
@@ -62,9 +61,9 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
     }
     single_process::remove_notes(directory)?;
     on_threads(threads, || {
-        let start = start(directory, &header, earlier, origin, false, run.progress)?;
+        let (journal, ..) = start(directory, &header, earlier, origin, false, run.progress)?;
         if origin != PlanOrigin::Kept {
-            write_plan(&start.journal, directory, plan)?;
+            write_plan(&journal, directory, plan)?;
         }
         Ok(None)
     })
@@ -73,17 +72,6 @@ pub(crate) fn plan(options: &JobOptions, run: RunOptions) -> crate::Result<Optio
 /// Returns the inputs that seem to have been modified since the same job was planned. Two changes within a second leave the same time in
 /// the fingerprint, and yet tasks refuse what was modified after the plan.
 fn modified_inputs(earlier: &EarlierRun, now: &Fingerprint) -> Option<String> {
-    let planned = earlier.header.as_ref().filter(|planned| now.since_planned(&planned.fingerprint).is_none())?;
-    now.modified_since(planned)
-}
-
-/// Tells whether the job with this fingerprint is planned. Nobody starts it over meanwhile.
-fn is_planned(directory: &JobDirectory, fingerprint: &Fingerprint, submission: u64) -> crate::Result<bool> {
-    if !exists(&directory.journal())? {
-        return Ok(false);
-    }
-    let _lock = Lock::share(directory.job())?;
-    let known = planned(directory, submission)?;
-    let is_same = known.is_some_and(|(header, _)| fingerprint.is_same_job(&header));
-    Ok(is_same && Parts::of(&Plan::read(&directory.plan())?).all().len() > 1)
+    let is_same = now.since_planned(&earlier.header.fingerprint).is_none();
+    now.modified_since(&earlier.header).filter(|_| is_same)
 }

@@ -1,12 +1,13 @@
 //! How far a job is.
 
 use crate::durable::directory::JobDirectory;
-use crate::index::PartIndex;
 use crate::options::JobOptions;
 use crate::phase::Phase;
+use crate::records::JobStep;
 use crate::report::job_report::SlowestPart;
 use crate::report::job_status::{JobState, JobStatus, PhaseStatus};
 use crate::run::finished::{InPlace, results_in_place};
+use crate::run::meshed_part::MeshedPart;
 use crate::run::planned_job::PlannedJob;
 use crate::run::single_process;
 use crate::run::tasks::missing::JobProgressByPart;
@@ -31,28 +32,30 @@ pub(crate) fn status(options: &JobOptions, tasks: Option<u32>) -> Result<JobStat
     };
     let Some(job) = PlannedJob::open(&directory, options, 0)? else { return Ok(simple(without_plan)) };
     let progress = JobProgressByPart::of(&job)?;
-    let phases =
-        Phase::of_job(options.leaves_points_out()).map(|phase| phase_status(&progress, phase, tasks)).collect();
-    Ok(JobStatus { phases, slowest_part: slowest(&progress), ..simple(JobState::UnderWay) })
+    let phases = Phase::of_job(options.leaves_points_out()).map(|phase| phase_status(&progress, phase, tasks));
+    let phases = phases.collect::<Result<_>>()?;
+    Ok(JobStatus { phases, slowest_part: slowest(&progress)?, ..simple(JobState::UnderWay) })
 }
 
-fn phase_status(progress: &JobProgressByPart, phase: Phase, tasks: Option<u32>) -> PhaseStatus {
-    let missing_tasks = tasks.map(|tasks| progress.missing_tasks(phase, tasks));
+fn phase_status(progress: &JobProgressByPart, phase: Phase, tasks: Option<u32>) -> Result<PhaseStatus> {
+    let missing_tasks = tasks.map(|tasks| progress.missing_tasks(phase, tasks)).transpose()?;
     if !phase.is_by_part() {
-        let done = u64::from(progress.is_done(phase));
-        return PhaseStatus { phase, done, of: 1, missing_parts: Vec::new(), missing_tasks };
+        let done = u64::from(progress.is_done(phase)?);
+        return Ok(PhaseStatus { phase, done, of: 1, missing_parts: Vec::new(), missing_tasks });
     }
-    let missing_parts: Vec<u32> = progress.missing(phase, 1).into_iter().map(|(part, _)| part.0).collect();
+    let missing_parts: Vec<u32> = progress.missing(phase, 1)?.into_iter().map(|(part, _)| part.0).collect();
     let of = progress.parts_of(phase);
-    PhaseStatus { phase, done: of - missing_parts.len() as u64, of, missing_parts, missing_tasks }
+    Ok(PhaseStatus { phase, done: of - missing_parts.len() as u64, of, missing_parts, missing_tasks })
 }
 
-fn slowest(progress: &JobProgressByPart) -> Option<SlowestPart> {
-    let seconds = progress.parts.iter().map(|part| part.seconds());
-    let (part, seconds) =
-        seconds.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, seconds)| *seconds > 0.0)?;
-    let index = PartIndex::new(part);
-    let expected = progress.job.parts.expected_points(index);
-    let points = progress.parts[part].mesh.as_ref().map_or(expected, |mesh| mesh.points);
-    Some(SlowestPart { part: part as u64, seconds, points })
+fn slowest(progress: &JobProgressByPart) -> Result<Option<SlowestPart>> {
+    let mut slowest: Option<SlowestPart> = None;
+    for (part, entries) in &progress.parts {
+        let (seconds, mesh) = (entries.seconds()?, entries.known::<MeshedPart>(JobStep::Mesh)?);
+        if seconds > 0.0 && slowest.is_none_or(|slowest| slowest.seconds <= seconds) {
+            let points = mesh.map_or_else(|| progress.job.parts.expected_points(*part), |mesh| mesh.points);
+            slowest = Some(SlowestPart { part: part.get() as u64, seconds, points });
+        }
+    }
+    Ok(slowest)
 }

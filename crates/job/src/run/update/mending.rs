@@ -3,8 +3,7 @@
 
 use crate::durable::atomic_file::{create_folder_of, publish, write_pending};
 use crate::durable::directory::JobDirectory;
-use crate::durable::file_list::listed;
-use crate::durable::journal::PublishedFile;
+use crate::durable::journal::{PublishedFile, listed};
 use crate::durable::listing::exists;
 use crate::plan::fingerprint::first_few;
 use crate::progress::stage::ProgressOutput;

@@ -4,4 +4,3 @@
 
 pub(crate) mod changes;
 pub(crate) mod mending;
-pub(crate) mod outdated;
