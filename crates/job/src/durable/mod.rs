@@ -11,6 +11,7 @@ pub mod journal;
 pub(crate) mod known_results;
 pub(crate) mod listing;
 pub mod lock;
+pub mod mapped;
 pub mod obstacles;
 pub mod packing;
 mod replacement;

@@ -3,6 +3,7 @@
 //!
 //! A bucket appends its blocks to **runs** of whole pages, so that the points of a tile lie in few places of the file.
 
+use crate::durable::mapped::{FilePart, MappedFile};
 use crate::durable::packing::{pack, unpack};
 use crate::durable::store::PAGE;
 use bytemuck::{Pod, Zeroable};
@@ -12,7 +13,6 @@ use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use sys::positional_io::read_exact_at;
 use sys::{Error, Result, disk, fault};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -51,6 +51,8 @@ pub struct PointFile {
     number: u16,
     path: PathBuf,
     file: File,
+    /// The map of a finished file; a growing one has none.
+    map: MappedFile,
     /// Where the next run begins.
     end: AtomicU64,
     /// The bytes in all blocks.
@@ -64,7 +66,7 @@ impl PointFile {
     /// [`Error::Io`] if it cannot be made.
     pub fn create(path: &Path, number: u16) -> Result<PointFile> {
         let file = disk::create(path).map_err(Error::io("create", path))?;
-        Ok(PointFile::new(path, number, file))
+        Ok(PointFile::new(path, number, file, MappedFile::default()))
     }
 
     /// Waits until all blocks are on the disk.
@@ -78,11 +80,12 @@ impl PointFile {
     /// Opens the finished point file with this `number` at `path` for reading.
     fn open(path: &Path, number: u16) -> Result<PointFile> {
         let file = File::open(path).map_err(Error::io("open", path))?;
-        Ok(PointFile::new(path, number, file))
+        let map = MappedFile::new(&file);
+        Ok(PointFile::new(path, number, file, map))
     }
 
-    fn new(path: &Path, number: u16, file: File) -> PointFile {
-        PointFile { number, path: path.to_path_buf(), file, end: AtomicU64::new(0), bytes: AtomicU64::new(0) }
+    fn new(path: &Path, number: u16, file: File, map: MappedFile) -> PointFile {
+        PointFile { number, path: path.to_path_buf(), file, map, end: AtomicU64::new(0), bytes: AtomicU64::new(0) }
     }
 
     /// Returns the number of bytes in all blocks.
@@ -145,10 +148,9 @@ impl PointFile {
         if rest.is_some_and(<[u8]>::is_empty) { Ok(()) } else { Err(damaged()) }
     }
 
-    fn packed(&self, block: PointBlock) -> Result<Vec<u8>> {
-        let mut packed = vec![0; block.bytes as usize];
-        let read = fault::read("read-points").and_then(|()| read_exact_at(&self.file, &mut packed, block.at));
-        read.map(|()| packed).map_err(Error::io("read", &self.path))
+    fn packed(&self, block: PointBlock) -> Result<FilePart<'_>> {
+        let part = || self.map.part(&self.file, block.at, block.bytes as usize);
+        fault::read("read-points").and_then(|()| part()).map_err(Error::io("read", &self.path))
     }
 }
 
