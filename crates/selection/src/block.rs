@@ -1,13 +1,13 @@
 //! The triangulation of what is selected, as far as it concerns the points of one block.
 
 use crate::area::is_in;
+use crate::column::Column;
 use crate::disc::Disc;
 use crate::error_bound::{Candidate, ErrorBound, VerticalError};
 use crate::mesh_of_points::{Held, MeshOfPoints, NONE, TriangleKey};
 use crate::near_points::{NearestTriangles, PointsByPlace};
 use crate::sample::Sample;
 use crate::selected_sites::SelectedSites;
-use crate::swap::Column;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;

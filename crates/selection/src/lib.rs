@@ -12,6 +12,7 @@
 
 mod area;
 mod block;
+mod column;
 mod disc;
 mod error_bound;
 mod hull;

@@ -1,7 +1,7 @@
 //! A triangulation that knows the points in its triangles.
 
+use crate::column::Column;
 use crate::error_bound::{ErrorBound, VerticalError};
-use crate::swap::Column;
 use bytemuck::{Pod, Zeroable};
 use delaunay::geometry::Site;
 use delaunay::geometry::predicates::orient2d;

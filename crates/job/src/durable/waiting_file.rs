@@ -73,4 +73,12 @@ impl WaitingFile {
         drop(self.file);
         disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))
     }
+
+    /// Removes a file that is in use, but will not be read any more.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(crate) fn remove(&self) -> Result<()> {
+        disk::remove_file(&self.path).map_err(Error::io("remove", &self.path))
+    }
 }

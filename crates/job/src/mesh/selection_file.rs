@@ -30,12 +30,12 @@ impl SelectionFile {
         self.most_in_use.load(Ordering::Relaxed)
     }
 
-    /// Removes the file.
+    /// Removes the file, which nothing reads any more.
     ///
     /// # Errors
     /// [`sys::Error::Io`].
-    pub(crate) fn discard(self) -> Result<()> {
-        self.file.discard()
+    pub(crate) fn remove(&self) -> Result<()> {
+        self.file.remove()
     }
 }
 

@@ -102,10 +102,13 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
         let selected = SelectedPart { all: figures, wanted, duplicates, temporary, blocks, digest };
         let is_last = number + 1 == parts.len();
         let stages = stage.take_if(|_| is_last).map(|stage| stage.finish()).into_iter().collect();
+        if is_last {
+            waiting.remove()?;
+        }
         folder.record(JobStep::Select, selected, stages)?;
     }
     job.plan.on_ground.set(on_ground);
-    Ok(waiting.discard()?)
+    Ok(())
 }
 
 /// Returns the key of the selection: the digest of the points of all parts, and which triangles are asked about.
