@@ -68,8 +68,7 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
             of_region.push(block);
         }
     }
-    let region =
-        |(cell, (bounds, blocks))| Region { source, cells, cell, blocks, bounds, selected_before: 0, taken: 0 };
+    let region = |(cell, (bounds, blocks))| Region { source, cells, cell, blocks, bounds, taken: 0 };
     Ok(Division { blocks, regions: regions.into_iter().map(region).collect() })
 }
 
@@ -82,15 +81,14 @@ pub(crate) struct Region<'a, E> {
     blocks: Vec<usize>,
     /// The box of its points.
     pub(crate) bounds: Bounds<2>,
-    /// The number of points that are selected from other regions, and the bytes of memory that they take.
-    selected_before: u64,
+    /// The bytes of memory that points of other regions take which are selected.
     taken: u64,
 }
 
 impl<E> Region<'_, E> {
-    /// Returns the region when so many points are `selected` from others, which take so many bytes of memory.
-    pub(crate) fn after(&self, selected: u64, taken: u64) -> Self {
-        Region { blocks: self.blocks.clone(), selected_before: selected, taken, ..*self }
+    /// Returns the region when the selected points of others take so many bytes of memory.
+    pub(crate) fn after(&self, taken: u64) -> Self {
+        Region { blocks: self.blocks.clone(), taken, ..*self }
     }
 }
 
@@ -130,7 +128,7 @@ impl<E: Send + From<sys::Error>> PointSource for Region<'_, E> {
         false
     }
 
-    fn after_round(&self, round: u32, selected: u64) -> Result<(), E> {
-        self.source.after_round(round, self.selected_before + selected)
+    fn after_round(&self) -> Result<(), E> {
+        self.source.after_round()
     }
 }

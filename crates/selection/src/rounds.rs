@@ -135,9 +135,9 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         self.selected.add(first)
     }
 
-    /// Returns the number of selected points, and the bytes of memory that they take.
-    pub(crate) fn selected(&self) -> [u64; 2] {
-        [self.selected.count(), self.selected.bytes()]
+    /// Returns the bytes of memory that selected points take.
+    pub(crate) fn selected_bytes(&self) -> u64 {
+        self.selected.bytes()
     }
 
     /// Does all rounds, over these samples one after the other, and returns what they select. Of points on one line that is all of them. `outline` are
@@ -199,7 +199,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             return Ok(false);
         }
         self.figures.rounds += 1;
-        self.source.after_round(self.figures.rounds, self.selected.count())?;
+        self.source.after_round()?;
         Ok(true)
     }
 

@@ -43,8 +43,7 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
     let mut rounds = Rounds::new(source, blocks, bounds, memory);
     let (mut corners, mut most) = (Vec::new(), 0);
     for region in &regions {
-        let [selected, taken] = rounds.selected();
-        let region = region.after(selected, taken);
+        let region = region.after(rounds.selected_bytes());
         let of_region = select_by_regions(&region, bound, sizes)?;
         most = most.max(of_region.figures.rounds);
         let selected = of_region.sites.within(region.bounds)?;

@@ -81,9 +81,9 @@ pub trait PointSource: Sync {
     /// Tells whether the caller wants to know how many points the triangle with these corners holds in the end.
     fn asks_about(&self, corners: [Site; 3]) -> bool;
 
-    /// Is called after each round with what has been selected so far.
+    /// Is called after each round.
     ///
     /// # Errors
     /// If the work is to be stopped.
-    fn after_round(&self, round: u32, selected: u64) -> Result<(), Self::Error>;
+    fn after_round(&self) -> Result<(), Self::Error>;
 }

@@ -92,7 +92,7 @@ impl PointSource for Cloud {
         true
     }
 
-    fn after_round(&self, _: u32, _: u64) -> sys::Result<()> {
+    fn after_round(&self) -> sys::Result<()> {
         Ok(())
     }
 }

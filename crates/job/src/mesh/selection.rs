@@ -286,7 +286,7 @@ impl PointSource for PointsInBlocks<'_> {
         self.rule.flow(corners).is_some()
     }
 
-    fn after_round(&self, _: u32, _: u64) -> Result<()> {
+    fn after_round(&self) -> Result<()> {
         fault::point("select");
         Ok(interrupt::check()?)
     }

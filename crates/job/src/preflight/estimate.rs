@@ -122,9 +122,9 @@ impl DiskEstimate {
 
 /// Returns the most bytes that a selection from so many points has in its file.
 fn selection_bytes(points: u64, options: &JobOptions) -> u64 {
-    // Blocks are at their places, with room to grow, and so is the list of selected points.
+    // Blocks have room to grow. Selected points are there for their region, and for the whole.
     const PER_POINT: u64 = 100;
-    const PER_SELECTED: u64 = 12;
+    const PER_SELECTED: u64 = 24;
     const PER_POINT_IN_MEMORY: u64 = 330;
     let fits = points * PER_POINT_IN_MEMORY <= selection_memory(options);
     if options.output.max_error == MaxError::None || fits {

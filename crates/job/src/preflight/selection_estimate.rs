@@ -78,7 +78,7 @@ impl PointSource for Sample<'_> {
         false
     }
 
-    fn after_round(&self, _: u32, _: u64) -> Result<()> {
+    fn after_round(&self) -> Result<()> {
         interrupt::check()
     }
 }
