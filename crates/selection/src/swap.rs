@@ -32,7 +32,7 @@ impl SwapSpace {
             self.free(place, store)?;
         }
         // Blocks grow.
-        let bytes = bytes + bytes / 2;
+        let bytes = bytes + bytes / 4;
         if self.0.fetch_add(bytes, Ordering::Relaxed) + bytes > SWAPPED {
             self.0.fetch_sub(bytes, Ordering::Relaxed);
             return Ok(None);

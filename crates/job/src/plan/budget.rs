@@ -35,12 +35,12 @@ pub fn working_memory(options: &JobOptions) -> u64 {
     options.limits.memory.0 / 4 * 3
 }
 
-/// Returns the bytes that a selection may use. Blocks come and go and grow, and the allocator keeps a part of what they leave: a third where
-/// they are few.
+/// Returns the bytes that a selection may use. Blocks come and go and grow, and the allocator keeps a part of what they leave, which is most where
+/// the memory is small.
 pub(crate) fn selection_memory(options: &JobOptions) -> u64 {
-    const KEPT: u64 = 64 << 20;
+    const KEPT: u64 = 80 << 20;
     let quarter = working_memory(options) / 4;
-    3 * quarter - quarter.min(KEPT)
+    3 * quarter - (quarter / 4 * 5).min(KEPT)
 }
 
 /// Returns the bytes that the merge at one node may use.

@@ -122,8 +122,8 @@ impl DiskEstimate {
 
 /// Returns the most bytes that a selection from so many points has in its file.
 fn selection_bytes(points: u64, options: &JobOptions) -> u64 {
-    // Blocks have room to grow. Selected points are there for their region, and for the whole.
-    const PER_POINT: u64 = 100;
+    // Of blocks whose points are all selected, with room to grow. Selected points are there for their region, and for the whole.
+    const PER_POINT: u64 = 600;
     const PER_SELECTED: u64 = 24;
     const PER_POINT_IN_MEMORY: u64 = 330;
     let fits = points * PER_POINT_IN_MEMORY <= selection_memory(options);
