@@ -172,7 +172,7 @@ impl Block {
         };
         block.place_displaced();
         // The list of all points is never as long again.
-        block.displaced = Vec::new();
+        block.rest();
         block.complete(selected, true)?;
         Ok(block)
     }
@@ -191,13 +191,17 @@ impl Block {
         columns
     }
 
-    /// Returns the bytes of memory that it takes.
+    /// Returns the bytes of memory that it takes while it rests.
     pub(crate) fn bytes(&self) -> u64 {
-        let Block { points, later, next, displaced, at_border, shared, near, mesh, .. } = self;
+        let Block { points, later, next, at_border, shared, near, mesh, .. } = self;
         let of_points = (points.capacity() + later.capacity()) * size_of::<[i32; 3]>()
-            + displaced.capacity() * size_of::<(u32, u32)>()
             + (next.capacity() + at_border.capacity() + shared.capacity()) * size_of::<u32>();
         (of_points + near.bytes() + mesh.bytes()) as u64
+    }
+
+    /// Gives back what is needed during a round alone.
+    pub(crate) fn rest(&mut self) {
+        self.displaced = Vec::new();
     }
 
     /// Returns the number of sites of its triangulation.
@@ -257,7 +261,7 @@ impl Block {
         self.sample = sample;
         self.mesh.changed = (0..self.mesh.held.len() as u32).collect();
         self.place_displaced();
-        self.displaced = Vec::new();
+        self.rest();
         self.complete(selected, true)
     }
 

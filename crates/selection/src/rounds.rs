@@ -224,7 +224,15 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         state: &mut BlockState,
         work: impl FnOnce(&mut Block) -> T,
     ) -> Result<T, E> {
-        let Some(bounds) = state.bounds else { return Ok(T::default()) };
+        let Some(mut block) = self.block(index, state)? else { return Ok(T::default()) };
+        let done = work(&mut block);
+        self.put_block(block, state)?;
+        Ok(done)
+    }
+
+    /// Returns a block that knows all that is selected; `None` for one without points.
+    fn block(&self, index: usize, state: &mut BlockState) -> Result<Option<Block>, E> {
+        let Some(bounds) = state.bounds else { return Ok(None) };
         let triangulated = |points, afar: &[[i32; 3]]| {
             let triangulate = |sites: &[Site]| self.source.triangulate(sites);
             Block::new(points, bounds, self.sample, &self.selected, afar, triangulate)
@@ -246,9 +254,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             }
         };
         block.look_at(self.sample, &self.selected)?;
-        let done = work(&mut block);
-        self.put_block(block, state)?;
-        Ok(done)
+        Ok(Some(block))
     }
 
     /// Takes a block from where it waits.
@@ -261,7 +267,8 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
 
     /// Lets a block wait in memory, or in the file if the memory does not hold it. If that has no space either, the block is made again when it is
     /// needed.
-    fn put_block(&self, block: Block, state: &mut BlockState) -> Result<(), E> {
+    fn put_block(&self, mut block: Block, state: &mut BlockState) -> Result<(), E> {
+        block.rest();
         let bytes = block.bytes();
         if self.memory.keeps_block(state.points, block.sites(), bytes, self.selected.bytes()) {
             (state.block, state.block_bytes) = (Some(block), bytes);
@@ -272,10 +279,8 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         Ok(())
     }
 
-    /// Forgets a block.
-    fn drop_block(&self, state: &mut BlockState) -> Result<(), E> {
-        (state.block, state.swapped) = (None, None);
-        self.memory.release(std::mem::take(&mut state.block_bytes));
+    /// Gives the place of a block in the file back.
+    fn free_place(&self, state: &mut BlockState) -> Result<(), E> {
         if let Some((place, store)) = state.place.take().zip(self.source.store()) {
             self.swap.free(place, store)?;
         }
@@ -285,11 +290,12 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
     fn finish(mut self) -> Result<Selection<'a>, E> {
         let errors = (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|index| {
             let mut state = self.blocks[index].lock().unwrap_or_else(PoisonError::into_inner);
-            let errors =
-                self.with_block(index, &mut state, |block| block.errors(|corners| self.source.asks_about(corners)));
+            let block = self.block(index, &mut state)?;
             // Nothing needs it any more.
-            self.drop_block(&mut state)?;
-            errors
+            self.free_place(&mut state)?;
+            Ok::<_, E>(
+                block.map_or(BlockErrors::default(), |block| block.errors(|corners| self.source.asks_about(corners))),
+            )
         });
         let errors: BlockErrors = errors.try_reduce(BlockErrors::default, |a, b| Ok(a.join(b)))?;
         let steps = (1u64 << crate::VerticalError::FRACTION_BITS) as f64;

@@ -3,14 +3,20 @@
 use crate::block::Block;
 use crate::source::SelectionStore;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use sys::Result;
 
 /// The most bytes of a file that the places of blocks have.
 pub const SWAPPED: u64 = 2 << 30;
 
-/// How many bytes of a file the places of blocks have.
+/// The places of blocks in a file.
 #[derive(Debug, Default)]
-pub(crate) struct SwapSpace(AtomicU64);
+pub(crate) struct SwapSpace {
+    /// How many bytes they have.
+    used: AtomicU64,
+    /// Places that blocks have left. Not every disk takes their space back.
+    left: Mutex<Vec<Place>>,
+}
 
 /// A place for so many bytes in a file.
 #[derive(Clone, Copy, Debug)]
@@ -31,13 +37,16 @@ impl SwapSpace {
             }
             self.free(place, store)?;
         }
-        // Blocks grow.
-        let bytes = bytes + bytes / 4;
-        if self.0.fetch_add(bytes, Ordering::Relaxed) + bytes > SWAPPED {
-            self.0.fetch_sub(bytes, Ordering::Relaxed);
+        let place = self.left_place(bytes).unwrap_or_else(|| {
+            // Blocks grow.
+            let bytes = bytes + bytes / 4;
+            Place { at: store.reserve(bytes), bytes }
+        });
+        if self.used.fetch_add(place.bytes, Ordering::Relaxed) + place.bytes > SWAPPED {
+            self.free(place, store)?;
             return Ok(None);
         }
-        Ok(Some(Place { at: store.reserve(bytes), bytes }))
+        Ok(Some(place))
     }
 
     /// Gives the space of a place back.
@@ -45,8 +54,17 @@ impl SwapSpace {
     /// # Errors
     /// [`sys::Error::Io`].
     pub(crate) fn free(&self, Place { at, bytes }: Place, store: &dyn SelectionStore) -> Result<()> {
-        self.0.fetch_sub(bytes, Ordering::Relaxed);
+        self.used.fetch_sub(bytes, Ordering::Relaxed);
+        self.left.lock().unwrap_or_else(PoisonError::into_inner).push(Place { at, bytes });
         store.free(at, bytes)
+    }
+
+    /// Returns the smallest place for so many bytes that a block has left.
+    fn left_place(&self, bytes: u64) -> Option<Place> {
+        let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let (number, _) =
+            left.iter().enumerate().filter(|(_, place)| place.bytes >= bytes).min_by_key(|(_, place)| place.bytes)?;
+        Some(left.swap_remove(number))
     }
 }
 

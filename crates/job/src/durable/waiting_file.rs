@@ -40,6 +40,11 @@ impl WaitingFile {
         self.end.fetch_add(bytes, Ordering::Relaxed)
     }
 
+    /// Returns the number of bytes that have a place.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.end.load(Ordering::Relaxed)
+    }
+
     /// Writes bytes to a place that they have [reserved](WaitingFile::reserve).
     ///
     /// # Errors

@@ -3,16 +3,14 @@
 use crate::durable::directory::JobDirectory;
 use crate::durable::waiting_file::WaitingFile;
 use selection::SelectionStore;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use sys::Result;
 
 /// A file of selected points, and of blocks between rounds.
 #[derive(Debug)]
 pub(crate) struct SelectionFile {
     file: WaitingFile,
-    /// The bytes that are in use, and the most that were.
-    in_use: AtomicU64,
-    most_in_use: AtomicU64,
+    is_removed: AtomicBool,
 }
 
 impl SelectionFile {
@@ -22,12 +20,12 @@ impl SelectionFile {
     /// [`sys::Error::Io`].
     pub(crate) fn at(directory: &JobDirectory) -> Result<SelectionFile> {
         let file = WaitingFile::at(&directory.scratch("selection"))?;
-        Ok(SelectionFile { file, in_use: AtomicU64::new(0), most_in_use: AtomicU64::new(0) })
+        Ok(SelectionFile { file, is_removed: AtomicBool::new(false) })
     }
 
-    /// Returns the most bytes that were in use at a time.
-    pub(crate) fn most_in_use(&self) -> u64 {
-        self.most_in_use.load(Ordering::Relaxed)
+    /// Returns the number of bytes that have a position. Not all of them are on the disk.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.file.bytes()
     }
 
     /// Removes the file, which nothing reads any more.
@@ -35,14 +33,23 @@ impl SelectionFile {
     /// # Errors
     /// [`sys::Error::Io`].
     pub(crate) fn remove(&self) -> Result<()> {
+        self.is_removed.store(true, Ordering::Relaxed);
         self.file.remove()
+    }
+}
+
+impl Drop for SelectionFile {
+    /// Where the selection has failed, the disk may be full.
+    fn drop(&mut self) {
+        if !self.is_removed.load(Ordering::Relaxed) {
+            // The error that ends the selection tells more than one here.
+            let _ = self.file.remove();
+        }
     }
 }
 
 impl SelectionStore for SelectionFile {
     fn reserve(&self, bytes: u64) -> u64 {
-        let in_use = self.in_use.fetch_add(bytes, Ordering::Relaxed) + bytes;
-        self.most_in_use.fetch_max(in_use, Ordering::Relaxed);
         self.file.reserve(bytes)
     }
 
@@ -55,7 +62,6 @@ impl SelectionStore for SelectionFile {
     }
 
     fn free(&self, at: u64, bytes: u64) -> Result<()> {
-        self.in_use.fetch_sub(bytes, Ordering::Relaxed);
         self.file.free(at..at + bytes)
     }
 }

@@ -83,7 +83,7 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
         stage.advance(parts.iter().map(|part| part.partition.kept).sum());
     }
     let mut stage = Some(stage);
-    let mut temporary = parts.iter().map(|part| part.partition.point_bytes).sum::<u64>() + waiting.most_in_use();
+    let mut temporary = parts.iter().map(|part| part.partition.point_bytes).sum::<u64>() + waiting.bytes();
     for (number, PartInBlocks { part, .. }) in parts.iter().enumerate() {
         let other = if number == 0 { None } else { Some(Folder::open(job, *part, key)?) };
         let folder = other.as_ref().unwrap_or(&first);
