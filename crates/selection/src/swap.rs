@@ -55,8 +55,10 @@ impl SwapSpace {
     /// [`sys::Error::Io`].
     pub(crate) fn free(&self, Place { at, bytes }: Place, store: &dyn SelectionStore) -> Result<()> {
         self.used.fetch_sub(bytes, Ordering::Relaxed);
+        // Before another block may write there.
+        store.free(at, bytes)?;
         self.left.lock().unwrap_or_else(PoisonError::into_inner).push(Place { at, bytes });
-        store.free(at, bytes)
+        Ok(())
     }
 
     /// Returns the smallest place for so many bytes that a block has left.
