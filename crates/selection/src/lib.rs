@@ -37,4 +37,4 @@ pub use rounds::{Figures, Selection};
 pub use select::select;
 pub use selected_sites::SelectedSites;
 pub use source::{BYTES_PER_POINT, BlockPoints, PointSource, SelectionStore};
-pub use swap::SWAPPED;
+pub use swap::MOST_SWAPPED;

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use sys::Result;
 
 /// The most bytes of a file that the places of blocks have.
-pub const SWAPPED: u64 = 2 << 30;
+pub const MOST_SWAPPED: u64 = 2 << 30;
 
 /// The places of blocks in a file.
 #[derive(Debug, Default)]
@@ -42,7 +42,7 @@ impl SwapSpace {
             let bytes = bytes + bytes / 4;
             Place { at: store.reserve(bytes), bytes }
         });
-        if self.used.fetch_add(place.bytes, Ordering::Relaxed) + place.bytes > SWAPPED {
+        if self.used.fetch_add(place.bytes, Ordering::Relaxed) + place.bytes > MOST_SWAPPED {
             self.free(place, store)?;
             return Ok(None);
         }

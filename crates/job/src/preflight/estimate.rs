@@ -19,7 +19,7 @@ use crate::publish::terrain_tiles::write_terrain::terrain_memory;
 use crate::tiles::vertex_colors::photo_memory;
 use delaunay::geometry::Bounds;
 use points::is_url;
-use selection::SWAPPED;
+use selection::MOST_SWAPPED;
 use std::path::{Path, PathBuf};
 use tiles::Compression;
 use tiles::attributes::AttributeChoice;
@@ -130,7 +130,7 @@ fn selection_bytes(points: u64, options: &JobOptions) -> u64 {
     if options.output.max_error == MaxError::None || fits {
         0
     } else {
-        (points * PER_POINT).min(SWAPPED) + points * PER_SELECTED
+        (points * PER_POINT).min(MOST_SWAPPED) + points * PER_SELECTED
     }
 }
 
