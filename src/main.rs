@@ -36,7 +36,7 @@ use survey::profile::{self, Profile, ProfileRequest};
 use survey::written::DifferenceOutput;
 use sys::threads;
 use sys::threads::on_threads;
-use sys::{ShownWarning, interrupt, say, shortage, terminal, with_remedy_below};
+use sys::{ShownWarning, fault, interrupt, say, shortage, terminal, with_remedy_below};
 use tiles::file_names::OutputFiles;
 use verify::{Conclusion, Watcher};
 
@@ -44,6 +44,9 @@ use verify::{Conclusion, Watcher};
 const MEMORY_FOR_LINES: u64 = 1 << 30;
 
 fn main() -> ExitCode {
+    if cfg!(feature = "fault-injection") {
+        fault::allow();
+    }
     match shortage::listen(exit_code).map_err(Error::from).and_then(|()| run(command_line())) {
         Ok(code) => code,
         Err(error) => {

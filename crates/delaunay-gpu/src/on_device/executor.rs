@@ -13,9 +13,7 @@ use crate::on_device::benefit::GpuBenefit;
 use crate::on_device::device;
 use crate::on_device::device::{AdapterRequest, MAX_SIDE};
 use crate::on_device::error::GpuError;
-#[cfg(feature = "fault-injection")]
 use crate::on_device::fake_engine;
-#[cfg(feature = "fault-injection")]
 use crate::on_device::fake_engine::FakeEngine;
 use crate::on_device::filled_atlas::{AtlasLimits, MAX_PIXELS};
 use crate::on_device::gpu_thread::{Filling, GpuState, GpuThread, MANY_SITES, MeshRequest};
@@ -121,7 +119,6 @@ impl Executor {
         let max_bytes = memory / 3 / BYTES_PER_BYTE_BACK;
         let filling = Filling { resolution, max_bytes };
         let capacity = Capacity { max_pixels: MAX_PIXELS, max_waiting: memory / 3 / BYTES_PER_WAITING_SITE };
-        #[cfg(feature = "fault-injection")]
         if let Some(engine) = FakeEngine::from_environment() {
             let open = move || Ok(Opened { engine, adapter: "no GPU".into(), capacity, filling });
             return Executor::on(open, capacity, gpu_use);
@@ -189,11 +186,7 @@ impl Executor {
 
     /// Tells whether a test wants an engine that is no GPU.
     pub fn is_wanted_by_test() -> bool {
-        #[cfg(feature = "fault-injection")]
-        if fake_engine::is_wanted() {
-            return true;
-        }
-        false
+        fake_engine::is_wanted()
     }
 
     /// Returns the seconds that every step has taken on the GPU itself so far; nothing if the adapter has no timestamps.

@@ -1,4 +1,4 @@
-//! An engine for tests that is no GPU: it makes meshes on its own thread as workers do, and answers late, or never. `GDT_GPU=slow:n` is
+//! An engine for tests (`sys::fault`) that is no GPU: it makes meshes on its own thread as workers do, and answers late, or never. `GDT_GPU=slow:n` is
 //! n milliseconds late for every atlas, and `GDT_GPU=silent` never answers. The shaders' twins would take so much processor time that
 //! jobs were slow for that reason.
 
@@ -16,6 +16,7 @@ use delaunay::voronoi::{PipelineBuffers, triangulate};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use sys::fault;
 
 /// See the module.
 pub(super) struct FakeEngine {
@@ -31,7 +32,7 @@ pub(super) fn is_wanted() -> bool {
 impl FakeEngine {
     /// Returns the engine that a test wants, if it does.
     pub(super) fn from_environment() -> Option<FakeEngine> {
-        let wanted = std::env::var("GDT_GPU").ok()?;
+        let wanted = fault::variable("GDT_GPU")?;
         if wanted == "silent" {
             return Some(FakeEngine { delay: None });
         }

@@ -12,7 +12,6 @@ pub mod device;
 pub mod engine;
 pub mod error;
 pub mod executor;
-#[cfg(feature = "fault-injection")]
 mod fake_engine;
 pub mod filled_atlas;
 pub mod flip_marks;
