@@ -42,6 +42,11 @@ impl Scheme {
         }
     }
 
+    /// Returns the zoom whose tiles are as wide as those of a zoom of the geographic scheme.
+    pub fn as_wide_as(self, geographic_zoom: u8) -> u8 {
+        geographic_zoom + self.delay()
+    }
+
     /// Returns the number of columns of a zoom.
     pub fn columns(self, zoom: u8) -> i32 {
         2 << zoom >> self.delay()

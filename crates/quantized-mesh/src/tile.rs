@@ -32,6 +32,16 @@ impl Tile {
         Tile { x: self.x.saturating_add(east), y: self.y.saturating_add(north), ..self }.once()
     }
 
+    /// Returns the tiles that have the same parent, this one among them.
+    pub fn siblings(self) -> impl Iterator<Item = Tile> {
+        let [x, y] = [self.x, self.y].map(|number| number & !1);
+        [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().map(move |[east, north]| Tile {
+            x: x | east,
+            y: y | north,
+            ..self
+        })
+    }
+
     /// A tile around the globe is beside itself, and has one number.
     fn once(self) -> Tile {
         if self.scheme.columns(self.zoom) == 1 { Tile { x: 0, ..self } } else { self }

@@ -76,8 +76,6 @@ pub(crate) struct Proposal {
     pub(crate) accepted: Vec<[i32; 3]>,
     /// The worst points that the block has of triangles that reach out of it, or are beside one that does.
     pub(crate) shared: Vec<SharedCandidate>,
-    /// The points that such triangles may outdo.
-    pub(crate) undecided: Vec<Undecided>,
 }
 
 /// Returns the distance in units of [`VerticalError::fixed`] above which a point is selected whatever is beside it. Four times the bound takes
@@ -86,21 +84,31 @@ pub(crate) fn far_above(bound: ErrorBound) -> u64 {
     4 * bound.fixed()
 }
 
-/// The worst point that a block has of a triangle.
+/// The worst point that a block has of a triangle about which other blocks may know more.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SharedCandidate {
     pub(crate) triangle: TriangleKey,
     pub(crate) candidate: Candidate,
+    /// Whether it is selected if no other block has a worse one: nothing that the block knows outdoes it.
+    pub(crate) is_proposed: bool,
+    /// Whether the block holds all points of the triangle.
+    pub(crate) is_inside: bool,
+    /// For each corner of the triangle, where the one beside it at the opposite side reaches out of the block, the corner of that one which is not in
+    /// this. The whole corners of all three would take twice the memory.
+    pub(crate) across: [Option<Site>; 3],
 }
 
-/// A point that is selected if no other block has a worse one.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Undecided {
-    pub(crate) candidate: Candidate,
-    /// Its triangle, if that reaches out of the block.
-    pub(crate) triangle: Option<TriangleKey>,
-    /// The triangles beside it that do.
-    pub(crate) beside: [Option<TriangleKey>; 3],
+impl SharedCandidate {
+    /// Returns the triangles beside its own that reach out of the block.
+    pub(crate) fn beside(&self) -> impl Iterator<Item = TriangleKey> {
+        let key = |corner: usize| {
+            let mut beside = self.triangle;
+            beside[corner] = self.across[corner]?;
+            beside.sort_unstable();
+            Some(beside)
+        };
+        (0..3).filter_map(key)
+    }
 }
 
 /// The distances of a block's points from the triangulation.
@@ -313,29 +321,30 @@ impl Block {
     /// Adds the worst point of a triangle to the proposal, if nothing that the block knows outdoes it. Tells whether other blocks may know more.
     fn propose_of(&self, t: usize, far: u64, proposal: &mut Proposal) -> bool {
         let candidate = self.candidate(t);
-        let triangle = (!self.mesh.held[t].is_inside()).then(|| self.mesh.key(t));
-        let mut beside = [None; 3];
+        let is_inside = self.mesh.held[t].is_inside();
+        let triangle = self.mesh.key(t);
+        let mut across = [None; 3];
         let mut is_outdone = false;
-        for (k, twin) in self.mesh.twins_of(t).into_iter().enumerate() {
+        for (side, twin) in HalfEdgeIndex::of_triangle(t).map(|side| (side, self.mesh.mesh.twin(side))) {
             if twin == HalfEdgeIndex::HULL {
                 continue;
             }
             let other = twin.triangle();
-            match self.mesh.held[other].is_inside() {
-                true => {
-                    is_outdone |=
-                        self.mesh.held[other].excess > 0 && !candidate.stands_beside(&self.candidate(other), far)
-                }
-                false => beside[k] = Some(self.mesh.key(other)),
+            if self.mesh.held[other].is_inside() {
+                is_outdone |= self.mesh.held[other].excess > 0 && !candidate.stands_beside(&self.candidate(other), far);
+            } else {
+                let [opposite, beyond] = [side, twin].map(|side| self.mesh.sites[self.mesh.mesh.apex(side).get()]);
+                let corner = triangle.iter().position(|corner| *corner == opposite);
+                across[corner.unwrap_or_default()] = Some(beyond);
             }
         }
-        let is_shared = triangle.is_some() || beside != [None; 3];
-        if is_shared {
-            proposal.shared.push(SharedCandidate { triangle: self.mesh.key(t), candidate });
-        }
+        let is_shared = !is_inside || across != [None; 3];
         match (is_outdone, is_shared) {
-            (true, _) => {}
-            (false, true) => proposal.undecided.push(Undecided { candidate, triangle, beside }),
+            (_, true) => {
+                let is_proposed = !is_outdone;
+                proposal.shared.push(SharedCandidate { triangle, candidate, is_proposed, is_inside, across });
+            }
+            (true, false) => {}
             (false, false) => proposal.accepted.push(candidate.point),
         }
         is_shared
@@ -345,7 +354,7 @@ impl Block {
     fn candidate(&self, triangle: usize) -> Candidate {
         let held = &self.mesh.held[triangle];
         let point = self.points.get(held.worst as usize).copied().unwrap_or_default();
-        Candidate { numerator: held.numerator(), excess: held.excess, point }
+        Candidate { numerator: held.numerator, excess: held.excess, point }
     }
 
     /// Tells whether a triangle lies in the block, so that it holds no points of others.

@@ -84,8 +84,8 @@ impl VerticalError {
 /// The worst point of a triangle, or of what a block holds of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Candidate {
-    /// That of its distance. All points of a triangle have the same denominator.
-    pub(crate) numerator: u128,
+    /// That of its distance, in two halves: it takes less memory. All points of a triangle have the same denominator.
+    pub(crate) numerator: [u64; 2],
     /// Its distance in units of [`VerticalError::fixed`].
     pub(crate) excess: u64,
     /// Lattice integers.

@@ -39,7 +39,7 @@ pub(crate) struct Held {
     /// The worst of them.
     pub(crate) worst: u32,
     /// The numerator of its distance, in two halves: the triangle takes less memory.
-    numerator: [u64; 2],
+    pub(crate) numerator: [u64; 2],
     /// Its distance in units of [`VerticalError::fixed`] if it exceeds the bound, else 0.
     pub(crate) excess: u64,
     /// The number of the list that the triangle was last put on.

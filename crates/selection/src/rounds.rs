@@ -4,8 +4,8 @@
 //! until the circle of no triangle that holds its points has one ([`crate::block`]). So these triangles are those of the whole triangulation.
 //! A triangle that reaches out of a block may hold points of others: their worst points are compared.
 
-use crate::block::{Block, BlockErrors, Proposal, SharedCandidate, Undecided, far_above};
-use crate::error_bound::{Candidate, ErrorBound};
+use crate::block::{Block, BlockErrors, Proposal, SharedCandidate, far_above};
+use crate::error_bound::ErrorBound;
 use crate::memory::BlockMemory;
 use crate::mesh_of_points::TriangleKey;
 use crate::near_points::PointsByPlace;
@@ -16,7 +16,6 @@ use crate::swap::{Place, SwapSpace, SwappedBlock};
 use delaunay::geometry::{Bounds, Site};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
 /// What a selection has come to.
@@ -327,19 +326,26 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
 
 /// Returns what all blocks together select.
 fn accepted(proposals: &[Proposal], far: u64) -> impl Iterator<Item = [i32; 3]> {
-    let mut worst: HashMap<TriangleKey, Candidate> = HashMap::new();
-    for SharedCandidate { triangle, candidate } in proposals.iter().flat_map(|proposal| &proposal.shared) {
-        let known = worst.entry(*triangle).or_insert(*candidate);
-        if candidate.is_worse_in_triangle(known) {
-            *known = *candidate;
+    let mut worst: Vec<&SharedCandidate> = proposals.iter().flat_map(|proposal| &proposal.shared).collect();
+    worst.par_sort_unstable_by_key(|shared| shared.triangle);
+    worst.dedup_by(|other, first| {
+        let is_same = other.triangle == first.triangle;
+        if is_same && other.candidate.is_worse_in_triangle(&first.candidate) {
+            *first = *other;
         }
-    }
-    let is_selected = move |Undecided { candidate, triangle, beside }: &&Undecided| {
-        let is_worst = triangle.is_none_or(|triangle| worst.get(&triangle) == Some(candidate));
-        let mut others = beside.iter().flatten().filter_map(|triangle| worst.get(triangle));
-        is_worst && others.all(|other| candidate.stands_beside(other, far))
+        is_same
+    });
+    let worst_of = move |triangle: TriangleKey| {
+        let found = worst.binary_search_by_key(&triangle, |shared| shared.triangle);
+        found.ok().map(|index| worst[index].candidate)
     };
-    let undecided = proposals.iter().flat_map(|proposal| &proposal.undecided).filter(is_selected);
+    let is_selected = move |shared: &&SharedCandidate| {
+        let SharedCandidate { triangle, candidate, is_proposed, is_inside, .. } = *shared;
+        *is_proposed
+            && (*is_inside || worst_of(*triangle) == Some(*candidate))
+            && shared.beside().filter_map(&worst_of).all(|other| candidate.stands_beside(&other, far))
+    };
+    let shared = proposals.iter().flat_map(|proposal| &proposal.shared).filter(is_selected);
     let of_one_block = proposals.iter().flat_map(|proposal| &proposal.accepted).copied();
-    undecided.map(|undecided| undecided.candidate.point).chain(of_one_block)
+    shared.map(|shared| shared.candidate.point).chain(of_one_block)
 }

@@ -13,7 +13,7 @@ use crate::publish::terrain_tiles::lakes::{shore_memory, shores_of};
 use crate::publish::terrain_tiles::limits::refused;
 use crate::publish::terrain_tiles::room::Room;
 use crate::publish::terrain_tiles::waiting::WaitingRecords;
-use crate::publish::terrain_tiles::zooms::{Surroundings, WaitingPiece, Zoom};
+use crate::publish::terrain_tiles::zooms::{WaitingPiece, Zoom};
 use crate::tiles::write_tile::TileStats;
 use delaunay::geometry::Bounds;
 use quantized_mesh::{HEIGHT_STEPS, LayerAbout, Scheme, Shore, Tile, Water, ZoomTiles, cut, finest_zoom, layer};
@@ -33,7 +33,7 @@ pub struct TerrainStats {
     pub tiles: u64,
     /// Bytes of all files.
     pub bytes: u64,
-    /// The height above the ellipsoid in metres around the terrain, where tiles reach beyond it.
+    /// The height above the ellipsoid in metres around the terrain.
     pub surroundings: f64,
     /// The zooms, from 0 on.
     pub zooms: Vec<ZoomStats>,
@@ -138,21 +138,21 @@ impl<'a> TerrainWork<'a> {
         let finish_tile = &|| steps.finish_tile();
         let room = &Room::of(self.plan);
         let mut finest = Zoom::finest((scheme, zoom), room, directory, pieces, list, finish_tile)?;
-        let surroundings = Surroundings { scheme, height: finest.mean_edge() };
+        let outside = finest.mean_edge();
         let lakes = shores.map(|shores| Lakes { shores, scheme, finest: zoom });
         let mut pyramid = Pyramid {
             directory,
             room,
-            surroundings,
+            outside,
             lakes,
             stats: TerrainStats::default(),
             files: Vec::new(),
             zooms: Vec::new(),
         };
-        pyramid.stats.surroundings = f64::from(surroundings.height) / HEIGHT_STEPS;
+        pyramid.stats.surroundings = f64::from(outside) / HEIGHT_STEPS;
         let degrees = degrees_of(scheme, &finest.tiles.iter().map(|tile| tile.tile).collect::<Vec<Tile>>());
         while finest.zoom > 0 {
-            let coarser = finest.coarser(room, directory, surroundings, finish_tile)?;
+            let coarser = finest.coarser(room, directory, outside, finish_tile)?;
             pyramid.write(finest, finish_tile)?;
             finest = coarser;
         }
@@ -206,7 +206,8 @@ struct Lakes {
 struct Pyramid<'a> {
     directory: &'a JobDirectory,
     room: &'a Room<'a>,
-    surroundings: Surroundings,
+    /// The height beside the terrain in steps.
+    outside: i32,
     lakes: Option<Lakes>,
     stats: TerrainStats,
     files: Vec<PendingFile>,
@@ -225,14 +226,14 @@ impl Pyramid<'_> {
         };
         let water = |lakes: &Lakes| Water::new(lakes.scheme, [zoom.zoom, lakes.finest], &lakes.shores);
         let water = self.lakes.as_ref().map(water);
-        self.files.extend(zoom.encode(self.room, self.surroundings, water.as_ref(), &write)?);
+        self.files.extend(zoom.encode(self.room, self.outside, water.as_ref(), &write)?);
         let tiles: Vec<Tile> = zoom.tiles.iter().map(|tile| tile.tile).collect();
         self.zooms.push(ZoomTiles::new(&tiles));
         self.stats.zooms.push(ZoomStats {
             tiles: tiles.len() as u64,
             triangles: zoom.tiles.iter().map(|tile| tile.triangles).sum(),
             error_to_finer: zoom.tiles.iter().map(|tile| tile.bound).max().unwrap_or(0) as f64 / HEIGHT_STEPS,
-            height_step: zoom.height_steps(self.surroundings.at(zoom.zoom)).metres(),
+            height_step: zoom.height_steps(self.outside).metres(),
         });
         zoom.discard()
     }

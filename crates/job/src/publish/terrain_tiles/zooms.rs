@@ -51,6 +51,10 @@ pub(super) struct WaitingPiece {
 /// Bytes that a vertex of a tile takes while the tile is written: its mesh, the same in the order of the format, normals, and the bytes.
 const BYTES_TO_WRITE: u64 = 160;
 
+/// From this zoom of the geographic scheme on, tiles are added around the terrain. It has 16 columns, of which the terrain has 5 at most. At coarser ones
+/// viewers expect errors that are greater than the height of any mountain.
+const FIRST_SURROUNDED_ZOOM: u8 = 3;
+
 /// Returns the bytes that the greatest tile of the zoom before that of these pieces takes while it is made, at most.
 fn to_select(pieces: &[WaitingPiece]) -> u64 {
     let mut vertices: HashMap<Tile, u64> = HashMap::new();
@@ -92,23 +96,30 @@ impl Zoom {
         Ok(finest)
     }
 
-    /// Adds tiles beside the terrain around those at its edge. Viewers would show parts of coarser tiles there, which do not quite meet the edge.
+    /// Adds tiles beside the terrain: all around those that hold some of it, and so many that a tile of the zoom before has all four or none.
+    ///
+    /// Where a tile is missing, viewers show a part of a coarser one. So none is missing beside a part of the terrain, and the coarser one has none of
+    /// it either: both are flat there.
     fn surround(&mut self) -> Result<()> {
+        if self.zoom < self.scheme.as_wide_as(FIRST_SURROUNDED_ZOOM) {
+            return Ok(());
+        }
         let known: HashSet<Tile> = self.tiles.iter().map(|tile| tile.tile).collect();
-        let at_edge = self.tiles.iter().filter(|tile| tile.has_surroundings);
-        let around = at_edge.flat_map(|tile| offsets().map(|offset| tile.tile.beside(offset)));
         let rows = 0..1 << self.zoom;
-        let mut missing: Vec<Tile> = around.filter(|tile| !known.contains(tile) && rows.contains(&tile.y)).collect();
+        let holds_terrain = |tile: &&WaitingTile| tile.heights[0] <= tile.heights[1];
+        let around = self.tiles.iter().filter(holds_terrain).flat_map(|tile| offsets().map(|by| tile.tile.beside(by)));
+        let around: HashSet<Tile> = around.filter(|tile| rows.contains(&tile.y)).chain(known.iter().copied()).collect();
+        let siblings = around.iter().flat_map(|tile| tile.siblings());
+        let mut missing: Vec<Tile> = siblings.filter(|tile| !known.contains(tile)).collect();
         missing.sort_unstable();
         missing.dedup();
-        let mesh = TileMesh::surroundings();
         for tile in missing {
-            self.tiles.push(WaitingTile::add(&self.file, tile, &mesh, 0)?);
+            self.tiles.push(WaitingTile::add(&self.file, tile, &flat(tile).map_err(broken)?, 0)?);
         }
         Ok(())
     }
 
-    /// Returns the tiles of the zoom before. At zoom 0 all are there, because viewers want all. `surroundings` is the height beside the terrain.
+    /// Returns the tiles of the zoom before. At zoom 0 all are there, because viewers want all. `outside` is the height beside the terrain in steps.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Interrupted`].
@@ -116,7 +127,7 @@ impl Zoom {
         &self,
         room: &Room,
         directory: &JobDirectory,
-        surroundings: Surroundings,
+        outside: i32,
         finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         let zoom = self.zoom.saturating_sub(1);
@@ -131,7 +142,7 @@ impl Zoom {
         };
         let made = room.share(&groups, load, 0, |group| {
             interrupt::check()?;
-            let made = self.above(group, &file, surroundings.at(zoom));
+            let made = self.above(group, &file, outside);
             finish_tile();
             made
         });
@@ -144,7 +155,9 @@ impl Zoom {
                 }
             }
         }
-        Ok(Zoom { scheme: self.scheme, zoom, tiles, file })
+        let mut coarser = Zoom { scheme: self.scheme, zoom, tiles, file };
+        coarser.surround()?;
+        Ok(coarser)
     }
 
     /// Makes the tile above some, which are all tiles in it.
@@ -159,11 +172,16 @@ impl Zoom {
         WaitingTile::add(file, tile, &mesh, bound)
     }
 
-    /// Returns the mean height along the edge of the terrain in steps; 0 if it has no edge within its tiles.
+    /// Returns the mean height along the edge of the terrain in steps. If it has no edge within its tiles, returns the middle of its heights.
     pub(super) fn mean_edge(&self) -> i32 {
         let sums = self.tiles.iter().map(|tile| tile.edge.map(i128::from));
         let [sum, count] = sums.fold([0, 0], |[sum, count], [more, others]| [sum + more, count + others]);
-        if count == 0 { 0 } else { sum.div_euclid(count) as i32 }
+        if count > 0 {
+            return sum.div_euclid(count) as i32;
+        }
+        let heights = self.tiles.iter().flat_map(|tile| tile.heights).map(i64::from);
+        let ends = heights.clone().min().zip(heights.max());
+        ends.map_or(0, |(low, high)| (low + high).div_euclid(2) as i32)
     }
 
     /// Returns the step of height that all tiles can be written with.
@@ -189,11 +207,10 @@ impl Zoom {
     pub(super) fn encode<T: Send>(
         &self,
         room: &Room,
-        surroundings: Surroundings,
+        outside: i32,
         water: Option<&Water>,
         write: &(dyn Fn(Tile, Vec<u8>) -> Result<T> + Sync),
     ) -> Result<Vec<T>> {
-        let outside = surroundings.at(self.zoom);
         let steps = self.height_steps(outside);
         let places: HashMap<Tile, u64> = self.tiles.iter().map(|tile| (tile.tile, tile.at)).collect();
         let load = |waiting: &WaitingTile| {
@@ -255,21 +272,6 @@ fn edge_of(mesh: &TileMesh) -> [i64; 2] {
 /// Returns where the tiles around one are: so many columns east and rows north.
 fn offsets() -> impl Iterator<Item = [i32; 2]> {
     (-1..=1).flat_map(|north| (-1..=1).map(move |east| [east, north])).filter(|offset| *offset != [0, 0])
-}
-
-/// What lies beside the terrain: a plain at the height of its edge, and the ellipsoid where the bound of a zoom is greater than that.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Surroundings {
-    pub(super) scheme: Scheme,
-    /// In steps.
-    pub(super) height: i32,
-}
-
-impl Surroundings {
-    /// Returns the height at a zoom.
-    pub(super) fn at(self, zoom: u8) -> i32 {
-        if quantized_mesh::bound(self.scheme, zoom) <= self.height.unsigned_abs().into() { self.height } else { 0 }
-    }
 }
 
 fn broken(error: delaunay::Error) -> Error {
