@@ -12,7 +12,7 @@ pub const LEVEL_ZERO_ERROR: f64 = 77_067.339_6;
 const SHARE: f64 = 0.25;
 
 /// Returns the bound that the vertices of a zoom are selected by, in steps of height.
-pub fn steps(scheme: Scheme, zoom: u8) -> u64 {
+pub(crate) fn steps(scheme: Scheme, zoom: u8) -> u64 {
     // Where a tile is as wide, viewers expect as much.
     ((LEVEL_ZERO_ERROR * SHARE * HEIGHT_STEPS) as u64) << scheme.delay() >> zoom
 }
@@ -25,6 +25,10 @@ const MOST_ZOOM: u8 = 20;
 
 /// Tiles of smaller zooms of the geographic scheme have vertices at least in a grid, so that they follow the curve of the earth. All finest tiles are flat enough without.
 pub(crate) const FIRST_FLAT_ZOOM: u8 = 10;
+
+/// From this zoom of the geographic scheme on, no tile is missing around those that hold some of the terrain. It has 16 columns, of which the terrain has
+/// 5 at most. At coarser ones viewers expect errors that are greater than the height of any mountain.
+pub const FIRST_SURROUNDED_ZOOM: u8 = 3;
 
 /// Returns the coarsest zoom, from 10 of the geographic scheme on, whose tiles have no more than some 16,000 vertices on average, at a latitude in
 /// radians. `area` is that of the terrain in square metres, with so many vertices.

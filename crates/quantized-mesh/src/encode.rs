@@ -19,6 +19,11 @@ impl HeightSteps {
         HeightSteps(smallest(range, farthest))
     }
 
+    /// Returns the height nearest to one, both in steps of nodes, that this step and finer ones hold exactly.
+    pub fn nearest(self, height: i32) -> i32 {
+        nearest(height.into(), self.0) as i32
+    }
+
     /// Returns the step in metres.
     pub fn metres(self) -> f64 {
         self.0 as f64 / HEIGHT_STEPS
@@ -33,6 +38,11 @@ const MOST_EXACT: i64 = (1 << 24) - (1 << 16);
 fn smallest(range: i64, farthest: i64) -> i64 {
     let fits = |step: &i64| range + 2 * step <= i64::from(LAST) * step && farthest <= MOST_EXACT.saturating_mul(*step);
     (0..48).map(|bit| 1 << bit).find(fits).unwrap_or(1 << 48)
+}
+
+/// Returns the multiple of `step` nearest to a height.
+fn nearest(height: i64, step: i64) -> i64 {
+    (2 * height + step).div_euclid(2 * step) * step
 }
 
 /// A tile that is to be written.
@@ -105,7 +115,6 @@ struct Heights {
 
 impl Heights {
     fn new(surface: &Surface, HeightSteps(shared): HeightSteps) -> Heights {
-        let nearest = |height: i64, step: i64| (2 * height + step).div_euclid(2 * step) * step;
         // Neighbours must have the same heights on the border, so those are rounded first.
         let height = |node: &Node| match i64::from(node.height(surface.outside)) {
             height if node.is_on_border() => nearest(height, shared),

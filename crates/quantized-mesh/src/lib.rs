@@ -36,7 +36,7 @@ mod unfold;
 mod water;
 
 pub use assemble::assemble;
-pub use bound::{LEVEL_ZERO_ERROR, finest_zoom, steps as bound};
+pub use bound::{FIRST_SURROUNDED_ZOOM, LEVEL_ZERO_ERROR, finest_zoom};
 pub use coarser::{Child, coarser, flat};
 pub use cut::{Piece, cut};
 pub use decode::{DecodedTile, NotATile, decode};

@@ -1,5 +1,6 @@
 //! Looks into the terrain tiles for globes: whether all that `layer.json` lists are there and can be read, whether each covers its place once and has
-//! a water mask if that is listed, and whether neighbours have the same vertices between them, at the same heights to the last bit.
+//! a water mask if that is listed, and whether neighbours have the same vertices between them, at the same heights to the last bit. Where no tile is
+//! beside one, viewers show a part of a coarser tile: there the side must be level, and at one height in all of them.
 //!
 //! The tiles of a zoom are read row by row, and of a row only checksums of its sides stay. So it takes little memory, however many there are, and however
 //! many `layer.json` claims.
@@ -13,7 +14,7 @@ use rayon::prelude::*;
 use serde::Deserialize;
 use xxhash_rust::xxh3::xxh3_128;
 
-use quantized_mesh::{DecodedTile, Scheme, decode};
+use quantized_mesh::{DecodedTile, FIRST_SURROUNDED_ZOOM, SPAN, Scheme, decode};
 use sys::{Error, Result, disk, interrupt};
 use tiles::checksums::{open_file, read_file};
 use tiles::file_names::OutputFiles;
@@ -47,6 +48,8 @@ pub(super) struct TerrainTiles {
     more: u64,
     /// The tiles that are listed and gone.
     gone: u64,
+    /// The heights that all level sides have in common where no tile is beside them.
+    surroundings: Option<[f64; 2]>,
 }
 
 #[derive(Deserialize)]
@@ -85,8 +88,20 @@ struct TileFiles<'a> {
     memory: u64,
 }
 
-/// A checksum of the vertices of each side of a tile: west, south, east, north.
-type Sides = [u128; 4];
+/// A side of a tile.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    /// A checksum of its vertices.
+    checksum: u128,
+    /// The lowest and the highest height in metres that its vertices may have had before rounding, if all have one.
+    level: Option<[f64; 2]>,
+}
+
+/// The west, south, east and north side of a tile.
+type Sides = [Side; 4];
+
+/// Their names.
+const SIDE_NAMES: [&str; 4] = ["western", "southern", "eastern", "northern"];
 
 impl TerrainTiles {
     /// Checks the terrain tiles in the output directory of a job, within about `memory` bytes; `None` if there are none.
@@ -155,8 +170,10 @@ impl TerrainTiles {
             }
             self.tiles += sides.len() as u64;
             self.compare_row(files.scheme, zoom, (row, &sides), &below);
+            self.check_north(files.scheme, zoom, &below, (row, &sides));
             below = (row, sides);
         }
+        self.check_north(files.scheme, zoom, &below, (i32::MAX, &BTreeMap::new()));
         Ok(listed)
     }
 
@@ -205,15 +222,59 @@ impl TerrainTiles {
     ) {
         for (&column, own) in sides {
             // The last column is beside the first.
-            let east = (column + 1) % scheme.columns(zoom);
-            if sides.get(&east).is_some_and(|other| own[2] != other[0]) {
-                self.fail(apart(zoom, [column, row], [east, row]));
+            let columns = scheme.columns(zoom);
+            let [west, east] = [columns - 1, 1].map(|step| (column + step) % columns);
+            match sides.get(&east) {
+                Some(other) if own[2].checksum != other[0].checksum => {
+                    self.fail(apart(zoom, [column, row], [east, row]));
+                }
+                Some(_) => {}
+                None => self.check_open_side(scheme, zoom, [column, row], (own, 2)),
             }
-            let south = below.get(&column).filter(|_| row_below + 1 == row);
-            if south.is_some_and(|other| own[1] != other[3]) {
-                self.fail(apart(zoom, [column, row - 1], [column, row]));
+            if !sides.contains_key(&west) {
+                self.check_open_side(scheme, zoom, [column, row], (own, 0));
+            }
+            match below.get(&column).filter(|_| row_below + 1 == row) {
+                Some(other) if own[1].checksum != other[3].checksum => {
+                    self.fail(apart(zoom, [column, row - 1], [column, row]));
+                }
+                None if row > 0 => self.check_open_side(scheme, zoom, [column, row], (own, 1)),
+                _ => {}
             }
         }
+    }
+
+    /// Checks the northern sides of the tiles of a row that has no tile north of them.
+    fn check_north(
+        &mut self,
+        scheme: Scheme,
+        zoom: u8,
+        (row, sides): &(i32, BTreeMap<i32, Sides>),
+        (row_above, above): (i32, &BTreeMap<i32, Sides>),
+    ) {
+        let is_last = i64::from(*row) + 1 == 1 << zoom;
+        let is_open = |column: &i32| !is_last && (row + 1 != row_above || !above.contains_key(column));
+        for (&column, own) in sides.iter().filter(|(column, _)| is_open(column)) {
+            self.check_open_side(scheme, zoom, [column, *row], (own, 3));
+        }
+    }
+
+    /// Checks that a side that has no tile beside it is level, and as high as all others.
+    fn check_open_side(&mut self, scheme: Scheme, zoom: u8, place: [i32; 2], (sides, side): (&Sides, usize)) {
+        // What should be beside a damaged tile is not known. At the coarsest zooms all surfaces are close enough.
+        if zoom < scheme.as_wide_as(FIRST_SURROUNDED_ZOOM) || !self.failures.is_empty() {
+            return;
+        }
+        let name = |what: &str| format!("{}: its {} side {what}", name(zoom, place), SIDE_NAMES[side]);
+        let Some([low, high]) = sides[side].level else {
+            return self.fail(name("is not level, and no tile is beside it"));
+        };
+        let [lowest, highest] = self.surroundings.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let common = [low.max(lowest), high.min(highest)];
+        if common[0] > common[1] {
+            return self.fail(name("is not as high as others that have no tile beside them"));
+        }
+        self.surroundings = Some(common);
     }
 
     /// Compares the number of tiles on the disk with that of the list.
@@ -323,7 +384,7 @@ fn read_tile(files: &TileFiles, zoom: u8, place: [i32; 2], room: u64) -> Result<
             None if files.have_water && tile.water.is_none() => {
                 ReadTile::Bad("has no water mask, and layer.json lists that".into())
             }
-            None => ReadTile::Whole(checksums(&tile)),
+            None => ReadTile::Whole(sides_of(&tile)),
         },
         Err(what) => ReadTile::Bad(format!("is no terrain tile: {what}")),
     })
@@ -348,7 +409,10 @@ fn too_large(path: &Path, bytes: u64) -> Error {
     Error::Memory(format!("{} takes about {limit} MiB to verify: set --memory \"{limit} MiB\" or more", path.display()))
 }
 
-fn checksums(tile: &DecodedTile) -> Sides {
+fn sides_of(tile: &DecodedTile) -> Sides {
+    // Heights are in single precision, and vertices in steps between two.
+    let [low, high] = tile.heights.map(f64::from);
+    let rounding = (high - low) / SPAN as f64 + low.abs().max(high.abs()) * f64::from(f32::EPSILON);
     [0, 1, 2, 3].map(|side| {
         let bytes = tile.side(side).flat_map(|(along, height)| {
             let mut bytes = [0; 10];
@@ -356,7 +420,11 @@ fn checksums(tile: &DecodedTile) -> Sides {
             bytes[2..].copy_from_slice(&height.to_bits().to_le_bytes());
             bytes
         });
-        xxh3_128(&bytes.collect::<Vec<u8>>())
+        let checksum = xxh3_128(&bytes.collect::<Vec<u8>>());
+        let mut heights = tile.side(side).map(|(_, height)| height);
+        let first = heights.next();
+        let level = first.filter(|first| heights.all(|height| height == *first));
+        Side { checksum, level: level.map(|height| [height - rounding, height + rounding]) }
     })
 }
 

@@ -38,6 +38,8 @@ pub(crate) struct TerrainCrowd {
     possible: u64,
     /// How many degrees of longitude the points span: twice as many as they are from the middle of all, at most.
     pub(crate) longitudes: f64,
+    /// How many degrees north or south of the equator the points are, at most.
+    pub(crate) latitude: f64,
 }
 
 /// Returns the tiling scheme that the user wants, if the user wants terrain tiles.
@@ -69,7 +71,12 @@ impl TerrainCrowd {
         let is_whole = options.output.max_edge == MaxEdge::default() && options.input.clip.is_none();
         let is_sure = is_whole && !options.leaves_points_out() && placed.shows_all;
         let shown = if is_sure { shown } else { 0 };
-        Some(TerrainCrowd { shown, possible: possible.max(finest), longitudes: placed.longitudes })
+        Some(TerrainCrowd {
+            shown,
+            possible: possible.max(finest),
+            longitudes: placed.longitudes,
+            latitude: placed.latitude,
+        })
     }
 
     /// Returns what is wrong if the memory has no room for the vertices that the sample shows.
@@ -152,7 +159,7 @@ mod tests {
     #[test]
     fn the_memory_that_a_message_names_has_room_for_the_tile() {
         for vertices in [60_000, 250_000, 1_000_000, 2_500_000, 60_000_000] {
-            let crowd = TerrainCrowd { shown: vertices, possible: vertices, longitudes: 0.0 };
+            let crowd = TerrainCrowd { shown: vertices, possible: vertices, longitudes: 0.0, latitude: 0.0 };
             let small = options(64 << 20);
             for why in [crowd.too_many(&small).unwrap(), crowd.warning(&small).unwrap()] {
                 let (_, after) = why.rsplit_once("memory = \"").unwrap();
@@ -166,7 +173,7 @@ mod tests {
 
     #[test]
     fn an_ordinary_tile_has_room_in_the_least_memory() {
-        let crowd = TerrainCrowd { shown: 32_000, possible: 32_000, longitudes: 0.0 };
+        let crowd = TerrainCrowd { shown: 32_000, possible: 32_000, longitudes: 0.0, latitude: 0.0 };
         assert_eq!(crowd.too_many(&options(64 << 20)), None);
     }
 }

@@ -56,6 +56,8 @@ pub(super) struct Placed {
     pub(super) shows_all: bool,
     /// Twice as many degrees as points are from the middle of all, at most.
     pub(super) longitudes: f64,
+    /// How many degrees north or south of the equator points are, at most.
+    pub(super) latitude: f64,
 }
 
 impl Placed {
@@ -83,6 +85,7 @@ impl Placed {
         let from = place(cloud.extent.middle().map(f64::from));
         Some(Placed {
             longitudes: from.map_or(0.0, |[from, _]| 2.0 * farthest(&sites, from)),
+            latitude: sites.iter().map(|site| site.place[1].abs().to_degrees()).fold(0.0, f64::max),
             sites,
             times: (cloud.records as f64 / cloud.seen.max(1) as f64).max(1.0),
             middle,
@@ -273,7 +276,15 @@ mod tests {
             let sites = wide.clone().chain(crowd.clone()).enumerate();
             let sites = sites.map(|(i, place)| PlacedSite { number: i / of_place, site: [i as i32, 7], place });
             let (middle, areas) = ([0.2, 0.8], [1.0; 2]);
-            Placed { sites: sites.collect(), times: 50.0, middle, areas, shows_all: true, longitudes: 0.0 }
+            Placed {
+                sites: sites.collect(),
+                times: 50.0,
+                middle,
+                areas,
+                shows_all: true,
+                longitudes: 0.0,
+                latitude: 0.0,
+            }
         };
         let most = |number: usize| of_place(number).most_in_a_tile((Scheme::Geographic, 12));
         let [shown, possible] = most(50);

@@ -49,16 +49,24 @@ fn check_latitudes(plan: &Plan, globe: &Globe, scheme: Scheme) -> Result<()> {
     if highest_latitude(plan, globe, plan.extent) <= scheme.most_latitude() {
         return Ok(());
     }
-    let highest = plan.inputs.iter().filter_map(|input| claimed_within(input.claimed, plan.extent));
-    let highest = highest.map(|claimed| highest_latitude(plan, globe, claimed)).fold(0.0, f64::max);
+    let of_inputs = || {
+        let claimed = plan.inputs.iter().filter_map(|input| claimed_within(input.claimed, plan.extent));
+        claimed.map(|claimed| highest_latitude(plan, globe, claimed)).fold(0.0, f64::max)
+    };
+    // A box that is transformed may hold a pole, as one in degrees around the 180th meridian does. Then a sample of the points decides.
+    let highest = match plan.options.input.to_crs {
+        Some(_) => plan.terrain_crowd.map_or(0.0, |crowd| crowd.latitude),
+        None => of_inputs(),
+    };
     if highest > scheme.most_latitude() { Err(beyond_latitudes(scheme, highest)) } else { Ok(()) }
 }
 
 /// Returns how many degrees of longitude the terrain spans for sure by the boxes of the inputs: each has a point on each side.
 fn claimed_longitudes(plan: &Plan, globe: &Globe, middle: &Place) -> f64 {
     const PARTS: i64 = 32;
-    // Bounds and areas cut boxes, and points may lie anywhere behind the cut.
-    if plan.options.input.rectangle().is_some() || plan.clip.is_some() {
+    // Bounds and areas cut boxes, and points may lie anywhere behind the cut. A box that is transformed may be far too large.
+    let input = &plan.options.input;
+    if input.rectangle().is_some() || input.to_crs.is_some() || plan.clip.is_some() {
         return 0.0;
     }
     let of_side = |side: Bounds<2>| {

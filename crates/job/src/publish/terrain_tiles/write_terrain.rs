@@ -138,7 +138,7 @@ impl<'a> TerrainWork<'a> {
         let finish_tile = &|| steps.finish_tile();
         let room = &Room::of(self.plan);
         let mut finest = Zoom::finest((scheme, zoom), room, directory, pieces, list, finish_tile)?;
-        let outside = finest.mean_edge();
+        let outside = finest.surroundings();
         let lakes = shores.map(|shores| Lakes { shores, scheme, finest: zoom });
         let mut pyramid = Pyramid {
             directory,

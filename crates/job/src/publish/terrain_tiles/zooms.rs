@@ -5,8 +5,8 @@ use crate::plan::terrain_crowd::{BYTES_PER_VERTEX, BYTES_TO_SELECT};
 use crate::publish::terrain_tiles::room::{Load, Room};
 use crate::publish::terrain_tiles::waiting::WaitingRecords;
 use quantized_mesh::{
-    BorderNormal, Child, HeightSteps, OUTSIDE, Scheme, Surface, Tile, TileMesh, Water, assemble, border_normals,
-    coarser, encode, flat,
+    BorderNormal, Child, FIRST_SURROUNDED_ZOOM, HeightSteps, OUTSIDE, Scheme, Surface, Tile, TileMesh, Water, assemble,
+    border_normals, coarser, encode, flat,
 };
 use std::collections::{HashMap, HashSet};
 use sys::{Error, Result, interrupt};
@@ -50,10 +50,6 @@ pub(super) struct WaitingPiece {
 
 /// Bytes that a vertex of a tile takes while the tile is written: its mesh, the same in the order of the format, normals, and the bytes.
 const BYTES_TO_WRITE: u64 = 160;
-
-/// From this zoom of the geographic scheme on, tiles are added around the terrain. It has 16 columns, of which the terrain has 5 at most. At coarser ones
-/// viewers expect errors that are greater than the height of any mountain.
-const FIRST_SURROUNDED_ZOOM: u8 = 3;
 
 /// Returns the bytes that the greatest tile of the zoom before that of these pieces takes while it is made, at most.
 fn to_select(pieces: &[WaitingPiece]) -> u64 {
@@ -172,16 +168,17 @@ impl Zoom {
         WaitingTile::add(file, tile, &mesh, bound)
     }
 
-    /// Returns the mean height along the edge of the terrain in steps. If it has no edge within its tiles, returns the middle of its heights.
-    pub(super) fn mean_edge(&self) -> i32 {
+    /// Returns the height of the surroundings in steps: the mean along the edge of the terrain, or the middle of all heights if it has no edge within its
+    /// tiles. Tiles of all zooms hold it exactly.
+    pub(super) fn surroundings(&self) -> i32 {
+        let heights = self.tiles.iter().map(|tile| tile.heights).filter(|[low, high]| low <= high);
+        let ends = heights.reduce(|[low, high], [lowest, highest]| [low.min(lowest), high.max(highest)]);
+        let [low, high] = ends.unwrap_or_default();
         let sums = self.tiles.iter().map(|tile| tile.edge.map(i128::from));
         let [sum, count] = sums.fold([0, 0], |[sum, count], [more, others]| [sum + more, count + others]);
-        if count > 0 {
-            return sum.div_euclid(count) as i32;
-        }
-        let heights = self.tiles.iter().flat_map(|tile| tile.heights).map(i64::from);
-        let ends = heights.clone().min().zip(heights.max());
-        ends.map_or(0, |(low, high)| (low + high).div_euclid(2) as i32)
+        let mean = if count > 0 { sum.div_euclid(count) as i32 } else { low.midpoint(high) };
+        let farthest = low.unsigned_abs().max(high.unsigned_abs());
+        HeightSteps::over(high.abs_diff(low).into(), farthest.into()).nearest(mean)
     }
 
     /// Returns the step of height that all tiles can be written with.
