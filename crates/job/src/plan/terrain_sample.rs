@@ -76,13 +76,15 @@ impl Placed {
         let PlacedSite { site, place: middle, .. } = *sites.get(sites.len() / 2)?;
         let shown: Vec<Site> = sites.iter().map(|site| site.site).collect();
         let along = |bounds: Bounds<2>| [0, 1].map(|axis| bounds.extent(axis) as f64);
-        let (own, whole) = (along(bounds_of(&shown)?), along(cloud.extent));
+        let of_sample = bounds_of(&shown)?;
+        let (own, whole) = (along(of_sample), along(cloud.extent));
         let shows_all = (0..2).all(|axis| own[axis] >= whole[axis] * REACHED);
         let hull = hull_area(&shown);
         // A terrain of a usual shape covers at least half of its box.
         let most = if shows_all { hull * WIDER } else { (hull * WIDER).max(whole[0] * whole[1] / 2.0) };
         let step = area_of_step(site, extras.resolution, &place).unwrap_or(cloud.frame.resolution_metres()[0].powi(2));
-        let from = place(cloud.extent.middle().map(f64::from));
+        // That of the extent may be far from all points where boxes are transformed.
+        let from = place(of_sample.middle().map(f64::from));
         Some(Placed {
             longitudes: from.map_or(0.0, |[from, _]| 2.0 * farthest(&sites, from)),
             latitude: sites.iter().map(|site| site.place[1].abs().to_degrees()).fold(0.0, f64::max),
