@@ -78,6 +78,14 @@ pub(crate) struct Proposal {
     pub(crate) shared: Vec<SharedCandidate>,
 }
 
+impl Proposal {
+    /// Returns the bytes of memory that it takes while a round is decided, in which all shared points are sorted.
+    pub(crate) fn bytes(&self) -> u64 {
+        let of_shared = self.shared.capacity() * size_of::<SharedCandidate>() + self.shared.len() * size_of::<usize>();
+        (of_shared + self.accepted.capacity() * size_of::<[i32; 3]>()) as u64
+    }
+}
+
 /// Returns the distance in units of [`VerticalError::fixed`] above which a point is selected whatever is beside it. Four times the bound takes
 /// 1 % more points than never, on ground and on woods, and half the time; twice the bound takes 5 to 8 % more.
 pub(crate) fn far_above(bound: ErrorBound) -> u64 {

@@ -12,11 +12,26 @@ pub(crate) struct BlockMemory {
     kept: AtomicU64,
     /// The most that a thread has taken with a block.
     most_of_thread: AtomicU64,
+    /// Those of all proposals of this round so far.
+    proposed: AtomicU64,
+    /// Those of the round before: so much may come in this one.
+    proposed_before: AtomicU64,
 }
 
 impl BlockMemory {
     pub(crate) fn new(limit: u64) -> BlockMemory {
-        BlockMemory { limit, kept: AtomicU64::new(0), most_of_thread: AtomicU64::new(0) }
+        let [kept, most_of_thread, proposed, proposed_before] = Default::default();
+        BlockMemory { limit, kept, most_of_thread, proposed, proposed_before }
+    }
+
+    /// A round begins, and the proposals of the one before are gone.
+    pub(crate) fn begin_round(&self) {
+        self.proposed_before.store(self.proposed.swap(0, Ordering::Relaxed), Ordering::Relaxed);
+    }
+
+    /// A block proposes points, which takes so many bytes until the end of the round.
+    pub(crate) fn note_proposal(&self, bytes: u64) {
+        self.proposed.fetch_add(bytes, Ordering::Relaxed);
     }
 
     /// Tells whether the points of a block stay, of which it has so many.
@@ -48,8 +63,9 @@ impl BlockMemory {
 
     fn keeps(&self, bytes: u64, selected: u64) -> bool {
         let of_threads = rayon::current_num_threads() as u64 * self.most_of_thread.load(Ordering::Relaxed);
+        let proposed = self.proposed.load(Ordering::Relaxed).max(self.proposed_before.load(Ordering::Relaxed));
         let kept = self.kept.fetch_add(bytes, Ordering::Relaxed) + bytes;
-        let stays = kept + of_threads + selected <= self.limit;
+        let stays = kept + of_threads + selected + proposed <= self.limit;
         if !stays {
             self.release(bytes);
         }

@@ -181,6 +181,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
     /// Does rounds until no point of the sample exceeds `bound`.
     fn down_to(&mut self, bound: ErrorBound) -> Result<(), E> {
         loop {
+            self.memory.begin_round();
             let proposals =
                 (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|block| self.proposal_of(block, bound));
             let proposals = proposals.collect::<Result<Vec<_>, E>>()?;
@@ -211,6 +212,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         self.with_block(index, &mut state, |block| (block.propose(bound), block.settled_within())).map(
             |(proposal, settled)| {
                 state.settled = settled;
+                self.memory.note_proposal(proposal.bytes());
                 proposal
             },
         )
