@@ -37,32 +37,17 @@ pub(crate) fn check_terrain(plan: &Plan) -> Result<()> {
     let Some(scheme) = scheme_of(&plan.options) else { return Ok(()) };
     let globe = globe_of(plan)?;
     let middle = Place::of(plan, &globe, plan.extent.middle()).map_err(|why| refused(&why))?;
-    check_latitudes(plan, &globe, scheme)?;
-    let shown = plan.terrain_crowd.map_or(0.0, |crowd| crowd.longitudes);
-    longitudes_within(shown.max(claimed_longitudes(plan, &globe, &middle)))
-}
-
-/// # Errors
-/// [`Error::Config`] if the boxes of the inputs come too near to a pole.
-fn check_latitudes(plan: &Plan, globe: &Globe, scheme: Scheme) -> Result<()> {
-    // The box of all may be far more than where points are, such as around a pole. Those of the inputs decide then.
-    if highest_latitude(plan, globe, plan.extent) <= scheme.most_latitude() {
-        return Ok(());
+    // A sample of the points shows some of both, and the boxes of the inputs the rest.
+    let [latitude, longitudes] = plan.terrain_crowd.map_or([0.0; 2], |crowd| [crowd.latitude, crowd.longitudes]);
+    let highest = latitude.max(claimed(plan, &globe, |place| place.latitude.abs().to_degrees()));
+    if highest > scheme.most_latitude() {
+        return Err(beyond_latitudes(scheme, highest));
     }
-    let of_inputs = || {
-        let claimed = plan.inputs.iter().filter_map(|input| claimed_within(input.claimed, plan.extent));
-        claimed.map(|claimed| highest_latitude(plan, globe, claimed)).fold(0.0, f64::max)
-    };
-    // A box that is transformed may hold a pole, as one in degrees around the 180th meridian does. Then a sample of the points decides.
-    let highest = match plan.options.input.to_crs {
-        Some(_) => plan.terrain_crowd.map_or(0.0, |crowd| crowd.latitude),
-        None => of_inputs(),
-    };
-    if highest > scheme.most_latitude() { Err(beyond_latitudes(scheme, highest)) } else { Ok(()) }
+    longitudes_within(longitudes.max(claimed(plan, &globe, |place| longitudes_from(&middle, place))))
 }
 
-/// Returns how many degrees of longitude the terrain spans for sure by the boxes of the inputs: each has a point on each side.
-fn claimed_longitudes(plan: &Plan, globe: &Globe, middle: &Place) -> f64 {
+/// Returns the greatest value of `measure` that a point has for sure by the boxes of the inputs: each has a point on each side.
+fn claimed(plan: &Plan, globe: &Globe, measure: impl Fn(Place) -> f64) -> f64 {
     const PARTS: i64 = 32;
     // Bounds and areas cut boxes, and points may lie anywhere behind the cut. A box that is transformed may be far too large.
     let input = &plan.options.input;
@@ -71,7 +56,7 @@ fn claimed_longitudes(plan: &Plan, globe: &Globe, middle: &Place) -> f64 {
     }
     let of_side = |side: Bounds<2>| {
         let places = grid_over(side, PARTS).map(|place| Place::of(plan, globe, place));
-        places.map(|place| place.map_or(0.0, |place| longitudes_from(middle, place))).fold(f64::MAX, f64::min)
+        places.map(|place| place.map_or(0.0, &measure)).fold(f64::MAX, f64::min)
     };
     plan.inputs.iter().flat_map(|input| sides(input.claimed)).map(of_side).fold(0.0, f64::max)
 }
@@ -100,21 +85,6 @@ fn longitudes_within(widest: f64) -> Result<()> {
         )));
     }
     Ok(())
-}
-
-/// Returns what a box that an input claims shares with the extent of the job.
-fn claimed_within(claimed: Bounds<2>, extent: Bounds<2>) -> Option<Bounds<2>> {
-    let min = [0, 1].map(|axis| claimed.min[axis].max(extent.min[axis]));
-    let max = [0, 1].map(|axis| claimed.max[axis].min(extent.max[axis]));
-    (0..2).all(|axis| min[axis] <= max[axis]).then_some(Bounds { min, max })
-}
-
-/// Returns the greatest latitude in a box in degrees north or south. Places that are not known do not count: a box may have corners outside of the range of
-/// a projection in which all points are.
-fn highest_latitude(plan: &Plan, globe: &Globe, bounds: Bounds<2>) -> f64 {
-    const PARTS: i64 = 32;
-    let places = grid_over(bounds, PARTS).filter_map(|place| Place::of(plan, globe, place).ok());
-    places.map(|place| place.latitude.abs().to_degrees()).fold(0.0, f64::max)
 }
 
 /// Returns places at equal distances in a box, so many times as far apart as its sides are long.
