@@ -7,7 +7,6 @@ use crate::publish::terrain_tiles::globe_grid::Place;
 use crate::publish::terrain_tiles::limits::{beyond_latitudes, refused};
 use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
-use quantized_mesh::Scheme;
 use sys::{Error, Result};
 use tiles::tiles3d::globe::Globe;
 
