@@ -507,6 +507,35 @@ mod tests {
         assert_fails(folder.path(), 6, &["terrain/ has 7 tiles, where layer.json lists 6"]);
     }
 
+    /// Viewers show a part of a coarser tile beside them.
+    #[test]
+    fn sides_without_a_tile_beside_them_must_be_level_and_of_one_height() {
+        let folder = tempfile::tempdir().unwrap();
+        let output = OutputFiles::new(folder.path());
+        let write = |zoom: u8, heights: [i32; 4]| {
+            let place = Tile { scheme: SCHEME, zoom, x: 5, y: 2 };
+            let path = output.terrain_tile(zoom, [5, 2]);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, tile(place, heights, None)).unwrap();
+            place
+        };
+        let zooms: Vec<ZoomTiles> = (0..6)
+            .map(|zoom| {
+                ZoomTiles::new(&(3..6).filter(|of| *of == zoom).map(|of| write(of, [100; 4])).collect::<Vec<_>>())
+            })
+            .collect();
+        let about = LayerAbout { scheme: SCHEME, has_water: false, bounds: [0.0; 4], attribution: None };
+        fs::write(output.terrain_layer(), layer(&zooms, &about)).unwrap();
+        assert_fails(folder.path(), 3, &[]);
+        // Zoom 3 is too coarse for that to matter.
+        write(3, [100, 100, 100, 900]);
+        assert_fails(folder.path(), 3, &[]);
+        write(4, [100, 100, 100, 900]);
+        assert_fails(folder.path(), 3, &["terrain/4/5/2.terrain: its eastern side is not level"]);
+        write(4, [900; 4]);
+        assert_fails(folder.path(), 3, &["terrain/5/5/2.terrain: its western side is not as high"]);
+    }
+
     #[test]
     fn a_list_of_impossible_tiles_is_named() {
         let folder = tempfile::tempdir().unwrap();
