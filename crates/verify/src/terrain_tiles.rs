@@ -533,7 +533,7 @@ mod tests {
         write(4, [100, 100, 100, 900]);
         assert_fails(folder.path(), 3, &["terrain/4/5/2.terrain: its eastern side is not level"]);
         write(4, [900; 4]);
-        assert_fails(folder.path(), 3, &["terrain/5/5/2.terrain: its western side is not as high"]);
+        assert_fails(folder.path(), 3, &["terrain/5/5/2.terrain: its eastern side is not as high"]);
     }
 
     #[test]
