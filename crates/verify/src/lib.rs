@@ -94,6 +94,7 @@ mod keyed_records;
 mod mesh_check;
 mod report;
 mod surface;
+mod terrain_layer;
 mod terrain_tiles;
 mod tile_files;
 mod verdict;

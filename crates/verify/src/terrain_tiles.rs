@@ -7,13 +7,12 @@
 
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
-use std::ops::RangeInclusive;
 use std::path::Path;
 
 use rayon::prelude::*;
-use serde::Deserialize;
 use xxhash_rust::xxh3::xxh3_128;
 
+use crate::terrain_layer::{Layer, Rectangle, is_possible, rows};
 use quantized_mesh::{DecodedTile, FIRST_SURROUNDED_ZOOM, SPAN, Scheme, decode};
 use sys::{Error, Result, disk, interrupt};
 use tiles::checksums::{open_file, read_file};
@@ -22,9 +21,6 @@ use tiles::gzip::{gunzipped, unpacked_length};
 
 /// More sentences than this would hide what else is wrong.
 const MAX_SENTENCES: usize = 20;
-
-/// Finer zooms than this are not written.
-const MOST_ZOOM: usize = 30;
 
 /// When so many tiles of the list are gone, the others are not looked for: a list may claim more of them than anybody can wait for.
 const MOST_GONE: u64 = 1000;
@@ -50,32 +46,6 @@ pub(super) struct TerrainTiles {
     gone: u64,
     /// The heights that all level sides have in common where no tile is beside them.
     surroundings: Option<[f64; 2]>,
-}
-
-#[derive(Deserialize)]
-struct Layer {
-    projection: String,
-    extensions: Vec<String>,
-    available: Vec<Vec<Rectangle>>,
-}
-
-impl Layer {
-    fn scheme(&self) -> Option<Scheme> {
-        [Scheme::Geographic, Scheme::WebMercator].into_iter().find(|scheme| scheme.projection() == self.projection)
-    }
-}
-
-/// Columns and rows of tiles, first and last.
-#[derive(Clone, Copy, Deserialize)]
-struct Rectangle {
-    #[serde(rename = "startX")]
-    west: i32,
-    #[serde(rename = "endX")]
-    east: i32,
-    #[serde(rename = "startY")]
-    south: i32,
-    #[serde(rename = "endY")]
-    north: i32,
 }
 
 /// What all tiles have in common.
@@ -301,47 +271,6 @@ impl TerrainTiles {
     }
 }
 
-/// Tells whether all rectangles lie within their zooms.
-fn is_possible(scheme: Scheme, available: &[Vec<Rectangle>]) -> bool {
-    let is_in = |low: i32, high: i32, count: i64| 0 <= low && low <= high && i64::from(high) < count;
-    let fits = |(zoom, rectangles): (u8, &Vec<Rectangle>)| {
-        let [columns, rows] = [scheme.columns(zoom).into(), 1i64 << zoom];
-        rectangles.iter().all(|all| is_in(all.west, all.east, columns) && is_in(all.south, all.north, rows))
-    };
-    available.len() < MOST_ZOOM && (0..).zip(available).all(fits)
-}
-
-/// Returns the rows of rectangles from the south, each with runs of its columns from the west.
-fn rows(mut rectangles: Vec<Rectangle>) -> impl Iterator<Item = (i32, Vec<RangeInclusive<i32>>)> {
-    rectangles.sort_unstable_by_key(|rectangle| std::cmp::Reverse(rectangle.south));
-    let (mut open, mut row): (Vec<Rectangle>, i32) = (Vec::new(), -1);
-    std::iter::from_fn(move || {
-        open.retain(|rectangle| rectangle.north > row);
-        row = match (open.is_empty(), rectangles.last()) {
-            (false, _) => row + 1,
-            (true, next) => next?.south,
-        };
-        while let Some(next) = rectangles.pop_if(|next| next.south == row) {
-            open.push(next);
-        }
-        Some((row, runs(&open)))
-    })
-}
-
-/// Returns the columns of rectangles, each once.
-fn runs(rectangles: &[Rectangle]) -> Vec<RangeInclusive<i32>> {
-    let mut ends: Vec<[i32; 2]> = rectangles.iter().map(|rectangle| [rectangle.west, rectangle.east]).collect();
-    ends.sort_unstable();
-    let mut runs: Vec<[i32; 2]> = Vec::new();
-    for [west, east] in ends {
-        match runs.last_mut() {
-            Some(last) if west <= last[1] => last[1] = last[1].max(east),
-            _ => runs.push([west, east]),
-        }
-    }
-    runs.into_iter().map(|[west, east]| west..=east).collect()
-}
-
 fn name(zoom: u8, [column, row]: [i32; 2]) -> String {
     format!("terrain/{zoom}/{column}/{row}.terrain")
 }
@@ -431,9 +360,7 @@ fn sides_of(tile: &DecodedTile) -> Sides {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
     use quantized_mesh::{HeightSteps, LayerAbout, Node, Surface, Tile, TileMesh, Water, ZoomTiles, encode, layer};
-    use std::collections::BTreeSet;
     use std::fs;
     use tiles::gzip::gzipped_mesh;
 
@@ -610,24 +537,5 @@ mod tests {
         fs::write(output.terrain_layer(), vec![b' '; 1 << 20]).unwrap();
         let needed = format!("layer.json takes about {LIST_FACTOR} MiB");
         assert!(memory_error(folder.path(), 1 << 20).contains(&needed));
-    }
-
-    proptest! {
-        #[test]
-        fn rows_have_all_tiles_of_the_rectangles_once(
-            rectangles in prop::collection::vec((0..20i32, 0..20i32, 0..4i32, 0..4i32), 0..12),
-        ) {
-            let rectangle = |&(west, south, wide, high): &(i32, i32, i32, i32)| {
-                Rectangle { west, east: west + wide, south, north: south + high }
-            };
-            let rectangles: Vec<Rectangle> = rectangles.iter().map(rectangle).collect();
-            let expected: BTreeSet<[i32; 2]> = rectangles
-                .iter()
-                .flat_map(|all| (all.south..=all.north).flat_map(|y| (all.west..=all.east).map(move |x| [y, x])))
-                .collect();
-            let found: Vec<[i32; 2]> =
-                rows(rectangles).flat_map(|(y, runs)| runs.into_iter().flatten().map(move |x| [y, x])).collect();
-            prop_assert_eq!(found, expected.into_iter().collect::<Vec<_>>());
-        }
     }
 }
