@@ -1,6 +1,7 @@
 //! Slivers along the hull are left out of what viewers see: the same ones whatever the tiles, and never lakes or holes.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
 
@@ -73,7 +74,7 @@ fn in_three_bits(number: i128) -> i128 {
     number >> below << below
 }
 
-/// The slivers of a mesh by their definition, one triangle after the other.
+/// The slivers of a mesh by their definition, those with the longest edges first: a way out goes over longer and longer ones.
 fn slivers(mesh: &[Triangle], cloud: &Cloud) -> Vec<Triangle> {
     let range = |axis: usize| {
         let values = || cloud.iter().map(|point| point[axis]);
@@ -89,19 +90,17 @@ fn slivers(mesh: &[Triangle], cloud: &Cloud) -> Vec<Triangle> {
         let others: i128 = edges.into_iter().map(square).sum::<i128>() - square(longest);
         (square(longest) > others && square(longest) > limit).then_some(longest)
     };
-    let leads_out = |t: &&Triangle| {
-        let (mut triangle, mut length) = (*t, 0);
-        loop {
-            let Some(edge) = flow(triangle) else { return false };
-            assert!(square(edge) > length, "edges grow along a way");
-            length = square(edge);
-            match at.get(&[edge[1], edge[0]]) {
-                Some(next) => triangle = next,
-                None => return true,
-            }
+    let mut ways: Vec<_> = mesh.iter().filter_map(|t| flow(t).map(|edge| (square(edge), edge, t))).collect();
+    ways.sort_unstable_by_key(|&(length, ..)| Reverse(length));
+    let mut found = BTreeSet::new();
+    for (length, edge, triangle) in ways {
+        let next = at.get(&[edge[1], edge[0]]);
+        assert!(next.and_then(|next| flow(next)).is_none_or(|edge| square(edge) > length), "edges grow along a way");
+        if next.is_none_or(|next| found.contains(*next)) {
+            found.insert(*triangle);
         }
-    };
-    mesh.iter().filter(leads_out).copied().collect()
+    }
+    found.into_iter().collect()
 }
 
 /// Asserts that jobs of any tiles, threads and parts leave out the slivers of the definition, or none if they are most of the mesh.
