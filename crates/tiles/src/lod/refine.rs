@@ -1,5 +1,7 @@
-//! Which vertices a simplified terrain takes in beyond its first ones: those that it is furthest from (Garland and Heckbert 1995, "Fast
-//! polygonal approximation of terrains and height fields"), in a few rounds.
+//! Which vertices a simplified terrain takes in beyond its first ones: those with the greatest error, in a few rounds (Garland and Heckbert
+//! 1995, "Fast polygonal approximation of terrains and height fields"). The error of a vertex is the square of its vertical distance times its
+//! share of the ground. So what is chosen makes the mean square over the ground least, and where long triangles span ground without points, their
+//! corners matter more than the vertices of a dense row.
 
 use crate::lod::cell_grid::CellGrid;
 use crate::lod::filling::Filling;
@@ -8,7 +10,7 @@ use sys::{Result, interrupt};
 
 /// The rounds: each looks at one of this many vertices. The first rounds choose few. The last ones are for places where many vertices stand
 /// out of one triangle, of which a round takes in one.
-const LOOKED_AT: [usize; 6] = [8, 4, 2, 1, 1, 1];
+const LOOKED_AT: [usize; 5] = [4, 2, 1, 1, 1];
 
 /// Steps of the walks to the vertices, on average, before the search gives up. Terrains need far fewer.
 const STEPS_PER_VERTEX: u64 = 64;
@@ -56,30 +58,30 @@ impl Places {
     }
 }
 
-/// Takes vertices of the terrain at `positions` into `filling` until it has `wanted`. Those that it has are `kept`; `allows` tells which
-/// others may be.
+/// Takes vertices of the terrain at `positions`, with these `areas`, into `filling` until it has `wanted`. Those that it has are `kept`;
+/// `allows` tells which others may be.
 ///
 /// # Errors
 /// [`sys::Error::Interrupted`].
 pub(crate) fn refine(
-    positions: &[[i32; 3]],
+    (positions, areas): (&[[i32; 3]], &[f64]),
     kept: &mut [bool],
     allows: impl Fn(usize) -> bool,
     filling: &mut Filling,
     places: &mut Places,
     wanted: usize,
 ) -> Result<()> {
-    let mut furthest = Furthest::default();
+    let mut worst = Worst::default();
     for (round, every) in LOOKED_AT.into_iter().enumerate() {
         interrupt::check()?;
         let has = filling.vertices.len();
         // Not `powf`, whose last digit may differ between machines.
         let growth = libm::pow(wanted as f64 / has as f64, 1.0 / (LOOKED_AT.len() - round) as f64);
         let count = ((has as f64 * growth).round() as usize).min(wanted).saturating_sub(has);
-        furthest.look(positions, |v| !kept[v] && allows(v), filling, places, every);
-        for far in furthest.of_all(count) {
-            kept[far.vertex as usize] = true;
-            places.insert(far.vertex, filling, |triangle| furthest.note_change(triangle));
+        worst.look((positions, areas), |v| !kept[v] && allows(v), filling, places, every);
+        for WorstVertex { vertex, .. } in worst.of_all(count) {
+            kept[vertex as usize] = true;
+            places.insert(vertex, filling, |triangle| worst.note_change(triangle));
         }
     }
     Ok(())
@@ -87,36 +89,36 @@ pub(crate) fn refine(
 
 /// A vertex that is over or under a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct FarVertex {
-    /// The vertical distance in steps of z.
-    distance: f64,
+struct WorstVertex {
+    /// The square of the vertical distance in steps of z, times the area of the vertex.
+    error: f64,
     vertex: u32,
 }
 
-/// The furthest vertex of every triangle. Those of triangles that have not changed stay known.
+/// The vertex with the greatest error in every triangle. Those of triangles that have not changed stay known.
 #[derive(Default)]
-struct Furthest {
-    of_triangles: Vec<FarVertex>,
+struct Worst {
+    of_triangles: Vec<WorstVertex>,
     has_changed: Vec<bool>,
     /// Of how many vertices the last look took one; 0 before the first look.
     last_every: usize,
 }
 
-impl Furthest {
+impl Worst {
     /// Looks at one of `every` vertices, among them all that were looked at before, as far as it `may_choose` them. What is known of a triangle
     /// that has not changed needs no second look.
     fn look(
         &mut self,
-        positions: &[[i32; 3]],
+        (positions, areas): (&[[i32; 3]], &[f64]),
         may_choose: impl Fn(usize) -> bool,
         filling: &Filling,
         places: &mut Places,
         every: usize,
     ) {
         self.has_changed.resize(filling.triangles(), true);
-        self.of_triangles.resize(filling.triangles(), FarVertex::default());
-        for (far, _) in self.of_triangles.iter_mut().zip(&self.has_changed).filter(|(_, has_changed)| **has_changed) {
-            *far = FarVertex::default();
+        self.of_triangles.resize(filling.triangles(), WorstVertex::default());
+        for (worst, _) in self.of_triangles.iter_mut().zip(&self.has_changed).filter(|(_, has_changed)| **has_changed) {
+            *worst = WorstVertex::default();
         }
         for v in (0..positions.len()).step_by(every) {
             // Those that were looked at before know their triangle, unless that has changed.
@@ -127,28 +129,28 @@ impl Furthest {
             let Some(triangle) = places.locate(v as u32, filling) else { break };
             let corners = filling.corners(triangle);
             let distance = vertical_distance(&corners.map(|site| filling.positions[site as usize]), positions[v]);
-            let vertex = v as u32;
-            let far = &mut self.of_triangles[triangle];
-            // Of two that are as far, the first one stays.
-            if distance > far.distance || distance == far.distance && vertex < far.vertex {
-                *far = FarVertex { distance, vertex };
+            let (error, vertex) = (distance * distance * areas[v], v as u32);
+            let worst = &mut self.of_triangles[triangle];
+            // Of two that are equal, the first one stays.
+            if error > worst.error || error == worst.error && vertex < worst.vertex {
+                *worst = WorstVertex { error, vertex };
             }
         }
         self.has_changed.fill(false);
         self.last_every = every;
     }
 
-    /// Returns the `count` vertices that are furthest, one of a triangle, in ascending order.
-    fn of_all(&self, count: usize) -> Vec<FarVertex> {
-        let mut furthest: Vec<FarVertex> = self.of_triangles.iter().copied().filter(|far| far.distance > 0.0).collect();
-        if count < furthest.len() {
-            // Distances are not negative, so their bits are in the same order.
-            furthest.select_nth_unstable_by_key(count, |far| std::cmp::Reverse((far.distance.to_bits(), far.vertex)));
-            furthest.truncate(count);
+    /// Returns the `count` vertices with the greatest errors, one of a triangle, in ascending order.
+    fn of_all(&self, count: usize) -> Vec<WorstVertex> {
+        let mut worst: Vec<WorstVertex> = self.of_triangles.iter().copied().filter(|worst| worst.error > 0.0).collect();
+        if count < worst.len() {
+            // Errors are not negative, so their bits are in the same order.
+            worst.select_nth_unstable_by_key(count, |worst| std::cmp::Reverse((worst.error.to_bits(), worst.vertex)));
+            worst.truncate(count);
         }
         // Vertices that follow each other are near each other, and so are their places in memory.
-        furthest.sort_unstable_by_key(|far| far.vertex);
-        furthest
+        worst.sort_unstable_by_key(|worst| worst.vertex);
+        worst
     }
 
     /// Notes that a triangle has changed. Those beyond the known ones are new anyway.

@@ -1,6 +1,6 @@
 //! A terrain with fewer triangles, to be seen from afar: the Delaunay triangulation of some of its vertices.
 //!
-//! One of every cell of a coarse grid stays, and then in a few rounds those vertices that the triangulation is furthest from (`refine.rs`).
+//! One of every cell of a coarse grid stays, and then in a few rounds the vertices at which the triangulation is worst (`refine.rs`).
 //! At the end the heights are moved to where they are nearest to the terrain around (`fit.rs`). Vertices of breaklines keep their own:
 //! see `kept_lines.rs`. This makes two meshes.
 //!
@@ -92,11 +92,11 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     interrupt::check()?;
     let mut filling = Filling::new(positions, &kept)?;
     let mut places = Places::new(positions, &filling);
-    refine(positions, &mut kept, |v| kept_lines.allows(v), &mut filling, &mut places, on_rim + wanted)?;
+    let areas = areas(terrain);
+    refine((positions, &areas), &mut kept, |v| kept_lines.allows(v), &mut filling, &mut places, on_rim + wanted)?;
     let side = side_of(bounds, filling.vertices.len());
     let mut fixed = vec![false; positions.len()];
     kept_lines.vertices.iter().for_each(|&v| fixed[v] = true);
-    let areas = areas(terrain);
     let located = places.locate_all(&filling);
     let typical_error = fit((positions, &areas), |v| fixed[v as usize], &mut filling, located)?;
     interrupt::check()?;
