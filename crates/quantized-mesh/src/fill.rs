@@ -35,16 +35,24 @@ pub(crate) fn within_border(nodes: &[Node]) -> Vec<[u32; 3]> {
     faces(nodes, (0..).zip(nodes).filter(|(_, node)| node.is_on_border()).map(|(v, _)| v), [])
 }
 
-/// Returns triangles between all vertices of a tile that have as many as possible of the edges of `triangles`.
+/// Returns triangles between all vertices of a tile that have as many as possible of the edges of `triangles`. Of two that cross, the shorter one
+/// stays: edges of long slivers along the hull are straight in degrees, not on the ground, so they may cross ordinary triangles beside them.
 pub(crate) fn planar(nodes: &[Node], triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
     let of_least = Groups::new(nodes.len(), edges.map(|[a, b]| (a.min(b), a.max(b))));
     drop(triangles);
     let edges = of_least.all().flat_map(|(v, others)| others.chunk_by(|a, b| a == b).map(move |same| [v, same[0]]));
+    let mut edges: Vec<[u32; 2]> = edges.collect();
+    edges.sort_unstable_by_key(|&edge| (square_length(edge.map(|v| nodes[v as usize])), edge));
     faces(nodes, 0..nodes.len() as u32, edges)
 }
 
-/// Returns the constrained Delaunay triangulation of some vertices. Rounding may let two of the edges cross: the first is one of it then.
+/// Returns the square of the length of an edge in square steps.
+fn square_length([from, to]: [Node; 2]) -> u64 {
+    u64::from(from.u.abs_diff(to.u)).pow(2) + u64::from(from.v.abs_diff(to.v)).pow(2)
+}
+
+/// Returns the constrained Delaunay triangulation of some vertices. Where two of the edges cross, the first is one of it.
 fn faces(
     nodes: &[Node],
     vertices: impl Iterator<Item = u32> + Clone,

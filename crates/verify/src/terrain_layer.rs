@@ -3,6 +3,7 @@
 use quantized_mesh::Scheme;
 use serde::Deserialize;
 use std::ops::RangeInclusive;
+use std::path::Path;
 
 /// Finer zooms than this are not written.
 const MOST_ZOOM: usize = 30;
@@ -33,6 +34,16 @@ pub(crate) struct Rectangle {
     south: i32,
     #[serde(rename = "endY")]
     north: i32,
+}
+
+/// Tells whether the tile at `path`, `zoom/column/row.terrain`, is one of those that are `available`.
+pub(crate) fn is_listed(available: &[Vec<Rectangle>], path: &Path) -> bool {
+    let numbers: Vec<Option<i32>> =
+        path.with_extension("").iter().map(|part| part.to_str().and_then(|part| part.parse().ok())).collect();
+    let &[Some(zoom), Some(column), Some(row)] = numbers.as_slice() else { return false };
+    let of_zoom = usize::try_from(zoom).ok().and_then(|zoom| available.get(zoom));
+    let holds = |all: &Rectangle| (all.west..=all.east).contains(&column) && (all.south..=all.north).contains(&row);
+    of_zoom.is_some_and(|rectangles| rectangles.iter().any(holds))
 }
 
 /// Tells whether all rectangles lie within their zooms.

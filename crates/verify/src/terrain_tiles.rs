@@ -12,7 +12,7 @@ use std::path::Path;
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_128;
 
-use crate::terrain_layer::{Layer, Rectangle, is_possible, rows};
+use crate::terrain_layer::{Layer, Rectangle, is_listed, is_possible, rows};
 use quantized_mesh::{DecodedTile, FIRST_SURROUNDED_ZOOM, SPAN, Scheme, decode};
 use sys::{Error, Result, disk, interrupt};
 use tiles::checksums::{open_file, read_file};
@@ -109,8 +109,8 @@ impl TerrainTiles {
     /// Checks all tiles that are listed, by zoom.
     fn check_all(&mut self, files: &TileFiles, available: Vec<Vec<Rectangle>>) -> Result<()> {
         let mut listed = 0;
-        for (zoom, rectangles) in (0u8..).zip(available) {
-            listed += self.check_zoom(files, zoom, rectangles)?;
+        for (zoom, rectangles) in (0u8..).zip(&available) {
+            listed += self.check_zoom(files, zoom, rectangles.clone())?;
             if self.gone >= MOST_GONE {
                 // The last sentence, so that no other one takes its place.
                 self.failures.push(format!(
@@ -120,7 +120,7 @@ impl TerrainTiles {
                 return Ok(());
             }
         }
-        self.compare_count(files.output, listed)
+        self.compare_count(&files.output.terrain_tiles(), &available, listed)
     }
 
     /// Checks the tiles of a zoom, and returns how many are listed. Ends early if too many of them are gone.
@@ -247,28 +247,41 @@ impl TerrainTiles {
         self.surroundings = Some(common);
     }
 
-    /// Compares the number of tiles on the disk with that of the list.
-    fn compare_count(&mut self, output: &OutputFiles, listed: u64) -> Result<()> {
-        let list = |folder: &Path| disk::list(folder).map_err(Error::io("list", folder));
-        let is_folder = |path: &Path| disk::is_folder(path).map_err(Error::io("read", path));
+    /// Compares the number of tiles in `folder` with that of the list.
+    fn compare_count(&mut self, folder: &Path, available: &[Vec<Rectangle>], listed: u64) -> Result<()> {
         let mut found = 0;
-        for zoom in list(&output.terrain_tiles())? {
-            if !is_folder(&zoom)? {
-                continue;
-            }
-            for column in list(&zoom)? {
-                interrupt::check()?;
-                if is_folder(&column)? {
-                    let is_tile = |path: &&std::path::PathBuf| path.extension().is_some_and(|e| e == "terrain");
-                    found += list(&column)?.iter().filter(is_tile).count() as u64;
-                }
-            }
-        }
+        each_tile(folder, |_| found += 1)?;
         if found > listed {
-            self.fail(format!("terrain/ has {found} tiles, where layer.json lists {listed}"));
+            let mut stray = None;
+            each_tile(folder, |path| {
+                if stray.is_none() && !is_listed(available, path) {
+                    stray = Some(path.to_owned());
+                }
+            })?;
+            let stray = stray.map_or(String::new(), |path| format!("; it lacks terrain/{}", path.display()));
+            self.fail(format!("terrain/ has {found} tiles, where layer.json lists {listed}{stray}"));
         }
         Ok(())
     }
+}
+
+/// Calls `visit` with the path of each tile, from the folder of all.
+fn each_tile(folder: &Path, mut visit: impl FnMut(&Path)) -> Result<()> {
+    let list = |folder: &Path| disk::list(folder).map_err(Error::io("list", folder));
+    let is_folder = |path: &Path| disk::is_folder(path).map_err(Error::io("read", path));
+    for zoom in list(folder)? {
+        if !is_folder(&zoom)? {
+            continue;
+        }
+        for column in list(&zoom)? {
+            interrupt::check()?;
+            if is_folder(&column)? {
+                let tiles = list(&column)?.into_iter().filter(|path| path.extension().is_some_and(|e| e == "terrain"));
+                tiles.for_each(|path| visit(path.strip_prefix(folder).unwrap_or(&path)));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn name(zoom: u8, [column, row]: [i32; 2]) -> String {
@@ -431,7 +444,11 @@ mod tests {
         assert_fails(folder.path(), 5, &["terrain/3/6/3.terrain is gone"]);
         fs::write(&one, &bytes).unwrap();
         fs::write(output.terrain_tile(3, [6, 4]), &bytes).unwrap();
-        assert_fails(folder.path(), 6, &["terrain/ has 7 tiles, where layer.json lists 6"]);
+        assert_fails(
+            folder.path(),
+            6,
+            &["terrain/ has 7 tiles, where layer.json lists 6; it lacks terrain/3/6/4.terrain"],
+        );
     }
 
     /// Viewers show a part of a coarser tile beside them.

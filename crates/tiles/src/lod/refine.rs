@@ -58,13 +58,13 @@ impl Places {
     }
 }
 
-/// Takes vertices of the terrain at `positions`, with these `areas`, into `filling` until it has `wanted`. Those that it has are `kept`;
+/// Takes vertices of the terrain at `positions`, with these `weights`, into `filling` until it has `wanted`. Those that it has are `kept`;
 /// `allows` tells which others may be.
 ///
 /// # Errors
 /// [`sys::Error::Interrupted`].
 pub(crate) fn refine(
-    (positions, areas): (&[[i32; 3]], &[f64]),
+    (positions, weights): (&[[i32; 3]], &[f64]),
     kept: &mut [bool],
     allows: impl Fn(usize) -> bool,
     filling: &mut Filling,
@@ -78,7 +78,7 @@ pub(crate) fn refine(
         // Not `powf`, whose last digit may differ between machines.
         let growth = libm::pow(wanted as f64 / has as f64, 1.0 / (LOOKED_AT.len() - round) as f64);
         let count = ((has as f64 * growth).round() as usize).min(wanted).saturating_sub(has);
-        worst.look((positions, areas), |v| !kept[v] && allows(v), filling, places, every);
+        worst.look((positions, weights), |v| !kept[v] && allows(v), filling, places, every);
         for WorstVertex { vertex, .. } in worst.of_all(count) {
             kept[vertex as usize] = true;
             places.insert(vertex, filling, |triangle| worst.note_change(triangle));
@@ -90,7 +90,7 @@ pub(crate) fn refine(
 /// A vertex that is over or under a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct WorstVertex {
-    /// The square of the vertical distance in steps of z, times the area of the vertex.
+    /// The square of the vertical distance in steps of z, times the weight of the vertex.
     error: f64,
     vertex: u32,
 }
@@ -109,7 +109,7 @@ impl Worst {
     /// that has not changed needs no second look.
     fn look(
         &mut self,
-        (positions, areas): (&[[i32; 3]], &[f64]),
+        (positions, weights): (&[[i32; 3]], &[f64]),
         may_choose: impl Fn(usize) -> bool,
         filling: &Filling,
         places: &mut Places,
@@ -129,7 +129,7 @@ impl Worst {
             let Some(triangle) = places.locate(v as u32, filling) else { break };
             let corners = filling.corners(triangle);
             let distance = vertical_distance(&corners.map(|site| filling.positions[site as usize]), positions[v]);
-            let (error, vertex) = (distance * distance * areas[v], v as u32);
+            let (error, vertex) = (distance * distance * weights[v], v as u32);
             let worst = &mut self.of_triangles[triangle];
             // Of two that are equal, the first one stays.
             if error > worst.error || error == worst.error && vertex < worst.vertex {

@@ -93,7 +93,14 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     let mut filling = Filling::new(positions, &kept)?;
     let mut places = Places::new(positions, &filling);
     let areas = areas(terrain);
-    refine((positions, &areas), &mut kept, |v| kept_lines.allows(v), &mut filling, &mut places, on_rim + wanted)?;
+    refine(
+        (positions, &weights(&areas, &outline)),
+        &mut kept,
+        |v| kept_lines.allows(v),
+        &mut filling,
+        &mut places,
+        on_rim + wanted,
+    )?;
     let side = side_of(bounds, filling.vertices.len());
     let mut fixed = vec![false; positions.len()];
     kept_lines.vertices.iter().for_each(|&v| fixed[v] = true);
@@ -178,6 +185,13 @@ fn changed_triangles(shown: &CoarseMesh, working: &CoarseMesh, covers: Vec<bool>
     let is_new = covers.into_iter().zip(is_new).filter(|(covers, _)| *covers).map(|(_, is_new)| is_new);
     let has_changed = |(t, is_new): &(&[u32; 3], bool)| *is_new || t.iter().any(|&v| has_moved[v as usize]);
     shown.triangles.iter().zip(is_new).filter(has_changed).map(|(t, _)| *t).collect()
+}
+
+/// Returns what the errors of vertices with these areas weigh. Those on the outline have triangles on one side alone, and neighbours meet them.
+/// So they weigh as much as the mean of all, or more.
+fn weights(areas: &[f64], outline: &Outline) -> Vec<f64> {
+    let mean = areas.iter().sum::<f64>() / areas.len() as f64;
+    areas.iter().zip(&outline.on).map(|(&area, is_on)| if *is_on { area.max(mean) } else { area }).collect()
 }
 
 fn count(marked: &[bool]) -> usize {

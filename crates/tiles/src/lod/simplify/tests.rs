@@ -211,6 +211,27 @@ fn what_viewers_get_covers_ragged_terrain_with_few_vertices_and_hides_its_outlin
     }
 }
 
+/// Long triangles span ground without points, and their corners decide more of the ground than the vertices of a dense row do.
+#[test]
+fn ground_without_points_is_nearer_than_ground_with_uneven_ones() {
+    let has_points = |x: i32, y: i32| !(150..450).contains(&x) || !(150..450).contains(&y);
+    let uneven = |i: i32| (i.wrapping_mul(7919) ^ i / 60 * 31) % 23;
+    let points = (0..60 * 60).map(|i| [i % 60 * 10 + i % 3, i / 60 * 10 + i % 7, uneven(i)]);
+    let tile = terrain(points.filter(|&[x, y, _]| has_points(x, y)).collect());
+    let simple = simplified(&tile, tile.triangles.len() / 5, None);
+    let square = |x: i32, y: i32| {
+        let [exact, coarse] = [&tile, &simple.surface].map(|of| height(of, [f64::from(x), f64::from(y)]).unwrap());
+        (exact - coarse).powi(2)
+    };
+    let mean = |is_with_points: bool| {
+        let places = (0..50 * 50).map(|i| [50 + i % 50 * 10, 50 + i / 50 * 10]);
+        let squares: Vec<f64> =
+            places.filter(|&[x, y]| has_points(x, y) == is_with_points).map(|[x, y]| square(x, y)).collect();
+        squares.iter().sum::<f64>() / squares.len() as f64
+    };
+    assert!(4.0 * mean(false) < mean(true), "{} and {}", mean(false), mean(true));
+}
+
 /// What looks across the border from above sees no gap: the skirts join the border all around, and end below the outline.
 #[test]
 fn skirts_hang_below_the_whole_border() {
