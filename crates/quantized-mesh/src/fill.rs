@@ -43,6 +43,7 @@ pub(crate) fn planar(nodes: &[Node], triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> 
     drop(triangles);
     let edges = of_least.all().flat_map(|(v, others)| others.chunk_by(|a, b| a == b).map(move |same| [v, same[0]]));
     let mut edges: Vec<[u32; 2]> = edges.collect();
+    drop(of_least);
     edges.sort_unstable_by_key(|&edge| (square_length(edge.map(|v| nodes[v as usize])), edge));
     faces(nodes, 0..nodes.len() as u32, edges)
 }
