@@ -1,7 +1,6 @@
 //! The heights of a simplified terrain: those with which it is nearest to the terrain around, instead of those of single points.
 
 use crate::lod::filling::Filling;
-use crate::lod::terrain::Terrain;
 use crate::lod::vertex_cells::plane;
 use delaunay::geometry::predicates::orient2d;
 use sys::{Result, interrupt};
@@ -9,11 +8,11 @@ use sys::{Result, interrupt};
 /// How often all heights move. Each further time would change them by a few hundredths of the error.
 const ROUNDS: usize = 3;
 
-/// Returns twice the area of the triangles around each vertex of a terrain, in square lattice steps: six times its share of the ground.
-pub(crate) fn areas(terrain: &Terrain) -> Vec<f64> {
-    let mut areas = vec![0.0; terrain.positions.len()];
-    for corners in terrain.triangles {
-        let [a, b, c] = corners.map(|v| plane(terrain.positions[v as usize]));
+/// Returns twice the area of the triangles around each vertex at `positions`, in square lattice steps: six times its share of the ground.
+pub(crate) fn areas_around(positions: &[[i32; 3]], triangles: &[[u32; 3]]) -> Vec<f64> {
+    let mut areas = vec![0.0; positions.len()];
+    for corners in triangles {
+        let [a, b, c] = corners.map(|v| plane(positions[v as usize]));
         let double_area = orient2d(a, b, c) as f64;
         corners.iter().for_each(|&v| areas[v as usize] += double_area);
     }

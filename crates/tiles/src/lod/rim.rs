@@ -3,7 +3,7 @@
 //! is above the surface beside it, and has a skirt that reaches below: who looks across the outline sees one of the two surfaces or the skirt.
 
 use crate::lod::filling::{Border, CoarseMesh, Filling};
-use crate::lod::fit::{distance_above, improve, samples};
+use crate::lod::fit::{areas_around, distance_above, improve, samples};
 use crate::lod::outline::Outline;
 use sys::Result;
 
@@ -54,10 +54,18 @@ pub(crate) fn shown(
     for _ in 0..ROUNDS {
         improve(&samples, &moves, &mut fitted)?;
     }
-    for (site, (&height, &before)) in fitted.iter().zip(&before).enumerate() {
+    let most = DEEPEST * mean_error;
+    for ((height, before), _) in fitted.iter_mut().zip(&before).zip(&moves).filter(|(_, moves)| **moves) {
+        *height = height.clamp(before - most, before + most);
+    }
+    let is_inner = |site: usize| !is_on_border[site] && may_move(filling.vertices[site]);
+    let areas_of_mesh = areas_around(&mesh.positions, &mesh.triangles);
+    let areas_of_sites: Vec<f64> =
+        number.iter().map(|&v| areas_of_mesh.get(v as usize).copied().unwrap_or(0.0)).collect();
+    let lift = lift(&areas_of_sites, &before, &fitted, is_inner).clamp(-most, most);
+    for (site, height) in fitted.into_iter().enumerate() {
         if let Some(position) = mesh.positions.get_mut(number[site] as usize) {
-            let most = DEEPEST * mean_error;
-            let height = if moves[site] { height.clamp(before - most, before + most) } else { height };
+            let height = if is_inner(site) { height - lift } else { height };
             position[2] = height.round() as i32;
         }
     }
@@ -77,6 +85,14 @@ const DEEPEST: f64 = 3.0;
 
 /// How often the heights beside the border move after it was raised.
 const ROUNDS: usize = 2;
+
+/// Returns by how much sites that are inner ones must go down, so that the mean height over the ground is what it was `before` they got the
+/// heights `after`. `areas` are those of the triangles around each.
+fn lift(areas: &[f64], before: &[f64], after: &[f64], is_inner: impl Fn(usize) -> bool) -> f64 {
+    let volume: f64 = areas.iter().zip(before).zip(after).map(|((area, before), after)| area * (after - before)).sum();
+    let inner: f64 = areas.iter().enumerate().filter(|(site, _)| is_inner(*site)).map(|(_, area)| area).sum();
+    if inner > 0.0 { volume / inner } else { 0.0 }
+}
 
 /// Tells for each site of `filling` whether it may move, and shares a triangle with one on the border without being on it.
 fn beside(filling: &Filling, is_on_border: &[bool], may_move: impl Fn(u32) -> bool) -> Vec<bool> {

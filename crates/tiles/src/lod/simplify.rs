@@ -18,7 +18,7 @@ use crate::frame::Frame;
 use crate::lod::covering::covering;
 pub use crate::lod::filling::CoarseMesh;
 use crate::lod::filling::Filling;
-use crate::lod::fit::{areas, fit};
+use crate::lod::fit::{areas_around, fit};
 use crate::lod::kept_lines::KeptLines;
 use crate::lod::outline::Outline;
 use crate::lod::refine::{Places, refine};
@@ -92,7 +92,7 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     interrupt::check()?;
     let mut filling = Filling::new(positions, &kept)?;
     let mut places = Places::new(positions, &filling);
-    let areas = areas(terrain);
+    let areas = areas_around(positions, terrain.triangles);
     refine(
         (positions, &weights(&areas, &outline)),
         &mut kept,
