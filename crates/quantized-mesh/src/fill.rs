@@ -96,3 +96,20 @@ fn is_terrain(nodes: &[Node], triangle: [u32; 3], around: &[[u32; 2]]) -> bool {
     }
     turns > 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_edges_that_cross_the_shorter_one_stays() {
+        let place = |(u, v): (u16, u16)| Node { u, v, h: 0 };
+        // A sliver from end to end, and two triangles on both sides of a short edge across it.
+        let nodes = [(0, 100), (1000, 100), (500, 90), (500, 110), (400, 102), (600, 101), (500, 120)].map(place);
+        let triangles = vec![[0, 1, 6], [2, 3, 4], [3, 2, 5]];
+        let planar = planar(&nodes, triangles);
+        let has = |a: u32, b: u32| planar.iter().any(|triangle| triangle.contains(&a) && triangle.contains(&b));
+        assert!(has(2, 3) && has(2, 4) && has(3, 5), "{planar:?}");
+        assert!(!has(0, 1), "{planar:?}");
+    }
+}
