@@ -41,6 +41,9 @@ pub(crate) fn is_listed(available: &[Vec<Rectangle>], path: &Path) -> bool {
     let numbers: Vec<Option<i32>> =
         path.with_extension("").iter().map(|part| part.to_str().and_then(|part| part.parse().ok())).collect();
     let &[Some(zoom), Some(column), Some(row)] = numbers.as_slice() else { return false };
+    if path != Path::new(&format!("{zoom}/{column}/{row}.terrain")) {
+        return false;
+    }
     let of_zoom = usize::try_from(zoom).ok().and_then(|zoom| available.get(zoom));
     let holds = |all: &Rectangle| (all.west..=all.east).contains(&column) && (all.south..=all.north).contains(&row);
     of_zoom.is_some_and(|rectangles| rectangles.iter().any(holds))
