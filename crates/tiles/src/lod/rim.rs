@@ -16,6 +16,8 @@ pub struct ShownMesh {
     pub bottoms: Vec<(u32, i32)>,
     /// The edges between two of them, which lead around the mesh: it is on their left.
     pub skirts: Vec<[u32; 2]>,
+    /// How many steps of z its inner vertices went down to make up for its border.
+    pub(crate) sunk: i32,
 }
 
 impl ShownMesh {
@@ -62,11 +64,10 @@ pub(crate) fn shown(
     let areas_of_mesh = areas_around(&mesh.positions, &mesh.triangles);
     let areas_of_sites: Vec<f64> =
         number.iter().map(|&v| areas_of_mesh.get(v as usize).copied().unwrap_or(0.0)).collect();
-    let lift = lift(&areas_of_sites, &before, &fitted, is_inner).clamp(-most, most);
+    let sunk = lift(&areas_of_sites, &before, &fitted, is_inner).clamp(-most, most).round() as i32;
     for (site, height) in fitted.into_iter().enumerate() {
         if let Some(position) = mesh.positions.get_mut(number[site] as usize) {
-            let height = if is_inner(site) { height - lift } else { height };
-            position[2] = height.round() as i32;
+            position[2] = height.round() as i32 - if is_inner(site) { sunk } else { 0 };
         }
     }
     let mut bottoms = Vec::with_capacity(border.edges.len());
@@ -76,7 +77,7 @@ pub(crate) fn shown(
             bottoms.push((number[site as usize], heights[site as usize][0].saturating_sub(lower)));
         }
     }
-    Ok(ShownMesh { mesh, bottoms, skirts: chained(&border) })
+    Ok(ShownMesh { mesh, bottoms, skirts: chained(&border), sunk })
 }
 
 /// How many times the mean error the heights beside the border may move. In woods, what makes up for a border as high as the crowns would

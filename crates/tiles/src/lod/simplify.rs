@@ -118,8 +118,9 @@ pub fn simplify(frame: &Frame, terrain: &Terrain, triangles: usize, lines: Optio
     let (working, is_new) = with_outline(positions, kept, &outline, filling, &mut places)?;
     let shown = shown.unwrap_or_else(|| ShownMesh::without_skirts(working.clone()));
     interrupt::check()?;
-    let changed = changed_triangles(&shown.mesh, &working, covers, is_new);
-    let errors = vertical_errors(positions, terrain.triangles, &outline.edges, &working, (&shown.mesh, &changed));
+    let changed = changed_triangles(&shown, &working, covers, is_new);
+    let shown_in_part = (&shown.mesh, changed.as_slice(), shown.sunk);
+    let errors = vertical_errors(positions, terrain.triangles, &outline.edges, &working, shown_in_part);
     let [working_error, shown_error] = errors.map(|error| error * up);
     Ok(Simplified { shown, working, working_error, shown_error, typical_error: typical_error * up, spacing: side * xy })
 }
@@ -172,15 +173,18 @@ fn with_outline(
     Ok((mesh, is_new))
 }
 
-/// Returns the triangles of `shown` that may not be in `working` with the same heights. They are those of a filling that it `covers`; `is_new`
-/// tells which of the filling have changed since.
-fn changed_triangles(shown: &CoarseMesh, working: &CoarseMesh, covers: Vec<bool>, is_new: Vec<bool>) -> Vec<[u32; 3]> {
+/// Returns the triangles of `shown` that may not be in `working` with the same heights, but for what all of its inner vertices have sunk. They are
+/// those of a filling that it `covers`; `is_new` tells which of the filling have changed since.
+fn changed_triangles(shown: &ShownMesh, working: &CoarseMesh, covers: Vec<bool>, is_new: Vec<bool>) -> Vec<[u32; 3]> {
+    let ShownMesh { mesh: shown, sunk, .. } = shown;
     let mut others = working.vertices.iter().zip(&working.positions);
     let has_moved: Vec<bool> = shown
         .vertices
         .iter()
         .zip(&shown.positions)
-        .map(|(v, position)| others.find(|(other, _)| *other == v).is_none_or(|(_, other)| other != position))
+        .map(|(v, position)| {
+            others.find(|(other, _)| *other == v).is_none_or(|(_, other)| other[2] - sunk != position[2])
+        })
         .collect();
     let is_new = covers.into_iter().zip(is_new).filter(|(covers, _)| *covers).map(|(_, is_new)| is_new);
     let has_changed = |(t, is_new): &(&[u32; 3], bool)| *is_new || t.iter().any(|&v| has_moved[v as usize]);

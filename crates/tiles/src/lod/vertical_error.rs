@@ -27,7 +27,7 @@ const MEASURED_FIRST: usize = 1024;
 const LOST: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// Returns the greatest vertical distances in steps of z between a terrain and two simplified ones: to `working`, and to the triangles of `shown` that
-/// may be `changed` from those of `working`, or the former if that is more. They are never too small. The triangles `fine` are between
+/// may be `changed` from those of `working`, or the former and what the others have `sunk`, if that is more. They are never too small. The triangles `fine` are between
 /// `positions` (lattice x, y, z), counterclockwise, and cover their ground, which has this `outline`, once. The triangles of the
 /// simplified ones are between some of these vertices, with other heights, and cover at least the same ground.
 pub(crate) fn vertical_errors(
@@ -35,13 +35,14 @@ pub(crate) fn vertical_errors(
     fine: &[[u32; 3]],
     outline: &[[u32; 2]],
     working: &CoarseMesh,
-    (shown, changed): (&CoarseMesh, &[[u32; 3]]),
+    (shown, changed, sunk): (&CoarseMesh, &[[u32; 3]], i32),
 ) -> [f64; 2] {
     let heights = HeightBounds::new(positions, fine);
     let range = heights.height_range();
     let fine = FineTerrain { heights: &heights, positions, triangles: fine, outline };
     let of_working = fine.error_of(working, &working.triangles, 0.0).unwrap_or(range);
-    let of_shown = fine.error_of(shown, changed, of_working).unwrap_or(range.max(of_working));
+    let of_others = of_working + f64::from(sunk.abs());
+    let of_shown = fine.error_of(shown, changed, of_others).unwrap_or(range.max(of_others));
     // Rounding loses about 2^-50 of a height.
     let lost = 1e-9 + range * LOST;
     [of_working, of_shown].map(|greatest| if greatest > 0.0 { (greatest + lost).min(range.max(greatest)) } else { 0.0 })
@@ -355,7 +356,7 @@ mod tests {
                 whole.error_of(t.map(|v| coarse.vertices[v as usize]), &corners, &mut steps).unwrap()
             });
             let furthest = furthest.fold(0.0, f64::max);
-            let [found, of_none] = vertical_errors(&positions, fine.corners(), &hull, &coarse, (&coarse, &[]));
+            let [found, of_none] = vertical_errors(&positions, fine.corners(), &hull, &coarse, (&coarse, &[], 0));
             prop_assert_eq!(found, of_none);
             let most = furthest + 2e-9;
             prop_assert!(found == 0.0 && furthest == 0.0 || (furthest..most).contains(&found), "{} and {}", found, furthest);
