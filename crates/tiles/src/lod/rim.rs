@@ -28,7 +28,7 @@ impl ShownMesh {
 }
 
 /// Returns the triangles of `filling` that `covers` tells of, with a border that is raised by what the `outline` of the terrain at `positions` is
-/// above them. Skirts reach below the outline by the mean error in steps of z. `areas` are those of [`samples`]. `may_move` tells which
+/// above them. Skirts reach below the outline by [`SPARE`] times the mean error in steps of z. `areas` are those of [`samples`]. `may_move` tells which
 /// vertices of the terrain are no parts of lines.
 pub(crate) fn shown(
     (positions, areas): (&[[i32; 3]], &[f64]),
@@ -43,7 +43,7 @@ pub(crate) fn shown(
     let reaches = reaches(positions, outline, filling, &border.edges, places);
     let (mut mesh, number) = filling.coarse(covers);
     let heights: Vec<[i32; 2]> =
-        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], mean_error)).collect();
+        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], SPARE * mean_error)).collect();
     let before: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
     let mut fitted = before.clone();
     let mut is_on_border = vec![false; fitted.len()];
@@ -79,6 +79,9 @@ pub(crate) fn shown(
     }
     Ok(ShownMesh { mesh, bottoms, skirts: chained(&border), sunk })
 }
+
+/// How many times the mean error skirts reach below the outline: the border lies over the neighbour's ground, which may fall away there.
+const SPARE: f64 = 2.0;
 
 /// How many times the mean error the heights beside the border may move. In woods, what makes up for a border as high as the crowns would
 /// be a ditch.
