@@ -82,6 +82,13 @@ pub(crate) fn samples(
     samples
 }
 
+/// Returns the sum of `heights`, one of each site, over the ground of the samples: height times area.
+pub(crate) fn volume(samples: &[Sample], heights: &[f64]) -> f64 {
+    let height_at =
+        |s: &Sample| s.sites.iter().zip(s.weights).map(|(&site, w)| w * heights[site as usize]).sum::<f64>();
+    samples.iter().map(|sample| sample.area * height_at(sample)).sum()
+}
+
 /// Moves those of `heights` once that may move. Returns the mean distance of the samples before.
 ///
 /// # Errors

@@ -3,7 +3,7 @@
 //! is above the surface beside it, and has a skirt that reaches below: who looks across the outline sees one of the two surfaces or the skirt.
 
 use crate::lod::filling::{Border, CoarseMesh, Filling};
-use crate::lod::fit::{areas_around, distance_above, improve, samples};
+use crate::lod::fit::{Sample, distance_above, improve, samples, volume};
 use crate::lod::outline::Outline;
 use sys::Result;
 
@@ -52,7 +52,9 @@ pub(crate) fn shown(
         is_on_border[site as usize] = true;
     }
     let moves = beside(filling, &is_on_border, |site| may_move(filling.vertices[site as usize]));
-    let samples = samples((positions, areas), &moves, filling, places);
+    let changes: Vec<bool> =
+        moves.iter().zip(&is_on_border).map(|(moves, is_on_border)| moves | is_on_border).collect();
+    let samples = samples((positions, areas), &changes, filling, places);
     for _ in 0..ROUNDS {
         improve(&samples, &moves, &mut fitted)?;
     }
@@ -61,10 +63,8 @@ pub(crate) fn shown(
         *height = height.clamp(before - most, before + most);
     }
     let is_inner = |site: usize| !is_on_border[site] && may_move(filling.vertices[site]);
-    let areas_of_mesh = areas_around(&mesh.positions, &mesh.triangles);
-    let areas_of_sites: Vec<f64> =
-        number.iter().map(|&v| areas_of_mesh.get(v as usize).copied().unwrap_or(0.0)).collect();
-    let sunk = lift(&areas_of_sites, &before, &fitted, is_inner).clamp(-most, most).round() as i32;
+    let changes: Vec<f64> = fitted.iter().zip(&before).map(|(after, before)| after - before).collect();
+    let sunk = sinking(&samples, areas, &changes, &is_on_border).clamp(-most, most).round() as i32;
     for (site, height) in fitted.into_iter().enumerate() {
         if let Some(position) = mesh.positions.get_mut(number[site] as usize) {
             position[2] = height.round() as i32 - if is_inner(site) { sunk } else { 0 };
@@ -90,12 +90,12 @@ const DEEPEST: f64 = 3.0;
 /// How often the heights beside the border move after it was raised.
 const ROUNDS: usize = 2;
 
-/// Returns by how much sites that are inner ones must go down, so that the mean height over the ground is what it was `before` they got the
-/// heights `after`. `areas` are those of the triangles around each.
-fn lift(areas: &[f64], before: &[f64], after: &[f64], is_inner: impl Fn(usize) -> bool) -> f64 {
-    let volume: f64 = areas.iter().zip(before).zip(after).map(|((area, before), after)| area * (after - before)).sum();
-    let inner: f64 = areas.iter().enumerate().filter(|(site, _)| is_inner(*site)).map(|(_, area)| area).sum();
-    if inner > 0.0 { volume / inner } else { 0.0 }
+/// Returns by how much sites that are not on the border must go down, so that the mean height over the ground is what it was before the
+/// heights of the sites had these `changes`. `samples` are those in triangles where a site has one, `areas` those of the whole terrain.
+fn sinking(samples: &[Sample], areas: &[f64], changes: &[f64], is_on_border: &[bool]) -> f64 {
+    let of_border: Vec<f64> = is_on_border.iter().map(|&is_on_border| f64::from(u8::from(is_on_border))).collect();
+    let inner = areas.iter().sum::<f64>() - volume(samples, &of_border);
+    if inner > 0.0 { volume(samples, changes) / inner } else { 0.0 }
 }
 
 /// Tells for each site of `filling` whether it may move, and shares a triangle with one on the border without being on it.
