@@ -215,7 +215,7 @@ fn what_viewers_get_covers_ragged_terrain_with_few_vertices_and_hides_its_outlin
 #[test]
 fn ground_without_points_is_nearer_than_ground_with_uneven_ones() {
     let has_points = |x: i32, y: i32| !(150..450).contains(&x) || !(150..450).contains(&y);
-    let uneven = |i: i32| (i.wrapping_mul(7919) ^ i / 60 * 31) % 23;
+    let uneven = |i: i32| (i.wrapping_mul(7919) ^ (i / 60 * 31)) % 23;
     let points = (0..60 * 60).map(|i| [i % 60 * 10 + i % 3, i / 60 * 10 + i % 7, uneven(i)]);
     let tile = terrain(points.filter(|&[x, y, _]| has_points(x, y)).collect());
     let simple = simplified(&tile, tile.triangles.len() / 5, None);
