@@ -1,7 +1,7 @@
 //! Which vertices a simplified terrain takes in beyond its first ones: those with the greatest error, in a few rounds (Garland and Heckbert
 //! 1995, "Fast polygonal approximation of terrains and height fields"). The error of a vertex is the square of its vertical distance times its
-//! share of the ground. So what is chosen makes the mean square over the ground least, and where long triangles span ground without points, their
-//! corners matter more than the vertices of a dense row.
+//! share of the ground. So each choice lowers the mean square over the ground, and where long triangles span ground without points, their corners
+//! come before the vertices of a dense row.
 
 use crate::lod::cell_grid::CellGrid;
 use crate::lod::filling::Filling;
