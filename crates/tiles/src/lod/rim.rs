@@ -52,9 +52,9 @@ pub(crate) fn shown(
         is_on_border[site as usize] = true;
     }
     let moves = beside(filling, &is_on_border, |site| may_move(filling.vertices[site as usize]));
-    let changes: Vec<bool> =
+    let may_change: Vec<bool> =
         moves.iter().zip(&is_on_border).map(|(moves, is_on_border)| moves | is_on_border).collect();
-    let samples = samples((positions, areas), &changes, filling, places);
+    let samples = samples((positions, areas), &may_change, filling, places);
     for _ in 0..ROUNDS {
         improve(&samples, &moves, &mut fitted)?;
     }

@@ -27,8 +27,8 @@ const MEASURED_FIRST: usize = 1024;
 const LOST: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// Returns the greatest vertical distances in steps of z between a terrain and two simplified ones: to `working`, and to the triangles of `shown` that
-/// may be `changed` from those of `working`, or the former and what the others have `sunk`, if that is more. They are never too small. The triangles `fine` are between
-/// `positions` (lattice x, y, z), counterclockwise, and cover their ground, which has this `outline`, once. The triangles of the
+/// may be `changed` from those of `working`, or the former and what the others have `sunk`, if that is more. They are never too small. The
+/// triangles `fine` are between `positions` (lattice x, y, z), counterclockwise, and cover their ground, which has this `outline`, once. Those of the
 /// simplified ones are between some of these vertices, with other heights, and cover at least the same ground.
 pub(crate) fn vertical_errors(
     positions: &[[i32; 3]],
