@@ -40,7 +40,7 @@ pub fn coarser(tile: Tile, children: &[Child], outside: i32) -> Result<(TileMesh
     fixed.extend(grid(&inside, &fixed, tile));
     fixed.sort_unstable_by_key(|node| node.order());
     fixed.dedup_by_key(|node| node.order());
-    let source = TileSource { tile, fixed: &fixed, inside: &inside, outside };
+    let source = TileSource { tile, scale: scale_of(tile), fixed: &fixed, inside: &inside, outside };
     source.mesh()
 }
 
@@ -181,22 +181,24 @@ fn grid(inside: &[Node], border: &[Node], tile: Tile) -> Vec<Node> {
 /// The vertices that a tile may have, as points to select from. Their x is stretched so that both axes have about the same scale on the ground.
 struct TileSource<'a> {
     tile: Tile,
+    /// The places in a step along both axes.
+    scale: [i32; 2],
     /// Those that it has in any case.
     fixed: &'a [Node],
     inside: &'a [Node],
     outside: i32,
 }
 
-impl TileSource<'_> {
-    /// Returns the places in a step along both axes.
-    fn scale(&self) -> [i32; 2] {
-        let [width, height] = self.tile.sides();
-        let wider = width / height * libm::cos(self.tile.middle()[1]);
-        [((f64::from(SCALE) * wider + 0.5) as i32).clamp(1, SCALE), SCALE]
-    }
+/// Returns the places in a step along both axes of a tile.
+fn scale_of(tile: Tile) -> [i32; 2] {
+    let [width, height] = tile.sides();
+    let wider = width / height * libm::cos(tile.middle()[1]);
+    [((f64::from(SCALE) * wider + 0.5) as i32).clamp(1, SCALE), SCALE]
+}
 
+impl TileSource<'_> {
     fn point(&self, node: &Node) -> [i32; 3] {
-        let [x, y] = self.scale();
+        let [x, y] = self.scale;
         [i32::from(node.u) * x, i32::from(node.v) * y, node.height(self.outside)]
     }
 
@@ -232,7 +234,7 @@ impl TileSource<'_> {
         let points: Vec<[i32; 3]> =
             self.inside.iter().filter(|node| !self.is_fixed(node)).map(|node| self.point(node)).collect();
         let refined = refined(&first, &points, bound as f64, MOST_VERTICES)?;
-        let [x, y] = self.scale();
+        let [x, y] = self.scale;
         let nodes = refined.points.iter().map(|[px, py, h]| Node { u: (px / x) as u16, v: (py / y) as u16, h: *h });
         let mesh = self.in_order(nodes.collect(), &refined.triangles);
         Ok((mesh, refined.excess.map_or(bound, |excess| libm::ceil(excess) as u64)))
@@ -246,7 +248,7 @@ impl TileSource<'_> {
 
     /// Returns the mesh of vertices.
     fn mesh_of(&self, nodes: Vec<Node>) -> Result<TileMesh, delaunay::Error> {
-        let [x, y] = self.scale();
+        let [x, y] = self.scale;
         let sites: Vec<Site> = nodes.iter().map(|node| [i32::from(node.u) * x, i32::from(node.v) * y]).collect();
         let mesh = canonical(&sites)?;
         Ok(self.in_order(nodes, mesh.corners()))

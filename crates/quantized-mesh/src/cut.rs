@@ -230,7 +230,9 @@ impl Clip {
     fn polygon(&self) -> Vec<Place> {
         let mut legs: Vec<Leg> = (0..3).map(|k| (Place::Corner(k), Line::Edge(k))).collect();
         for side in 0..4 {
-            legs = self.clipped(&legs, side);
+            if legs.iter().any(|&(place, _)| self.inside(place, side) < 0) {
+                legs = self.clipped(&legs, side);
+            }
         }
         legs.into_iter().map(|(place, _)| place).collect()
     }

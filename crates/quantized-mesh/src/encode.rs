@@ -40,9 +40,11 @@ fn smallest(range: i64, farthest: i64) -> i64 {
     (0..48).map(|bit| 1 << bit).find(fits).unwrap_or(1 << 48)
 }
 
-/// Returns the multiple of `step` nearest to a height.
+/// Returns the multiple of `step`, a power of two, nearest to a height.
 fn nearest(height: i64, step: i64) -> i64 {
-    (2 * height + step).div_euclid(2 * step) * step
+    // A division takes ten times as long.
+    let bits = step.trailing_zeros();
+    (2 * height + step) >> (bits + 1) << bits
 }
 
 /// A tile that is to be written.
@@ -59,6 +61,10 @@ pub struct Surface<'a> {
     pub water: Option<&'a Water>,
 }
 
+/// The bytes of a vertex and its two triangles, and those of a usual tile besides: room for most tiles.
+const BYTES_PER_VERTEX: usize = 20;
+const BYTES_BESIDE: usize = 4096;
+
 /// The number of the extension with normals.
 pub(crate) const NORMALS: u8 = 1;
 
@@ -70,12 +76,13 @@ pub fn encode(surface: &Surface, steps: HeightSteps) -> Vec<u8> {
     let Surface { tile, mesh, .. } = *surface;
     let heights = Heights::new(surface, steps);
     let order = VertexOrder::new(mesh);
-    let mut bytes = head(tile, heights.metres());
     let nodes: Vec<Node> = order.vertices.iter().map(|&v| mesh.nodes[v as usize]).collect();
+    let mut bytes = Vec::with_capacity(BYTES_PER_VERTEX * nodes.len() + BYTES_BESIDE);
+    push_head(&mut bytes, tile, heights.metres());
     bytes.extend((nodes.len() as u32).to_le_bytes());
     push_differences(&mut bytes, nodes.iter().map(|node| i32::from(node.u)));
     push_differences(&mut bytes, nodes.iter().map(|node| i32::from(node.v)));
-    push_differences(&mut bytes, order.vertices.iter().map(|&v| heights.quantized(v)));
+    push_differences(&mut bytes, order.vertices.iter().map(|&v| heights.quantized[v as usize].into()));
     let is_long = nodes.len() > 1 << 16;
     if is_long {
         bytes.resize(bytes.len().next_multiple_of(4), 0);
@@ -110,7 +117,8 @@ struct Heights {
     least: i64,
     /// The step, in steps of nodes.
     step: i64,
-    rounded: Vec<i64>,
+    /// In steps above the least.
+    quantized: Vec<u16>,
 }
 
 impl Heights {
@@ -124,16 +132,14 @@ impl Heights {
         let (low, high) = heights.iter().fold((i64::MAX, i64::MIN), |(low, high), h| (low.min(*h), high.max(*h)));
         let least = low.div_euclid(shared) * shared;
         let step = smallest(high - least, least.abs().max(high.abs())).min(shared);
-        Heights { least, step, rounded: heights.into_iter().map(|height| nearest(height, step)).collect() }
+        let quantized =
+            |height| ((nearest(height, step) - least) >> step.trailing_zeros()).clamp(0, LAST.into()) as u16;
+        Heights { least, step, quantized: heights.into_iter().map(quantized).collect() }
     }
 
     /// Returns the heights in metres that the least and the greatest number stand for.
     fn metres(&self) -> [f64; 2] {
         [self.least, self.least + i64::from(LAST) * self.step].map(|steps| steps as f64 / HEIGHT_STEPS)
-    }
-
-    fn quantized(&self, vertex: u32) -> i32 {
-        ((self.rounded[vertex as usize] - self.least) / self.step).clamp(0, i64::from(LAST)) as i32
     }
 }
 
@@ -161,10 +167,9 @@ impl VertexOrder {
     }
 }
 
-/// Returns the header.
-fn head(tile: Tile, heights: [f64; 2]) -> Vec<u8> {
+/// Adds the header.
+fn push_head(bytes: &mut Vec<u8>, tile: Tile, heights: [f64; 2]) {
     let Header { centre, radius, horizon } = Header::new(tile, heights);
-    let mut bytes = Vec::new();
     let mut push = |numbers: &[f64]| numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
     push(&centre);
     let [low, high] = heights.map(|height| (height as f32).to_le_bytes());
@@ -173,7 +178,6 @@ fn head(tile: Tile, heights: [f64; 2]) -> Vec<u8> {
     push(&centre);
     push(&[radius]);
     push(&horizon);
-    bytes
 }
 
 /// Adds each number as the difference to the one before, the sign in the last bit.
@@ -199,10 +203,12 @@ fn push_numbers(bytes: &mut Vec<u8>, numbers: impl Iterator<Item = u32>, is_long
 
 /// Adds the vertices along the west, south, east and north side, each list in the direction of its axis.
 fn push_sides(bytes: &mut Vec<u8>, nodes: &[Node], is_long: bool) {
+    let on_border: Vec<(u32, Node)> =
+        (0..).zip(nodes.iter().copied()).filter(|(_, node)| node.is_on_border()).collect();
     for (axis, end) in [(0, 0), (1, 0), (0, LAST), (1, LAST)] {
         let place = |node: &Node| if axis == 0 { [node.u, node.v] } else { [node.v, node.u] };
-        let along = (0u32..).zip(nodes).filter(|(_, node)| place(node)[0] == end).map(|(v, node)| (place(node)[1], v));
-        let mut along: Vec<(u16, u32)> = along.collect();
+        let along = on_border.iter().filter(|(_, node)| place(node)[0] == end);
+        let mut along: Vec<(u16, u32)> = along.map(|(v, node)| (place(node)[1], *v)).collect();
         along.sort_unstable();
         bytes.extend((along.len() as u32).to_le_bytes());
         push_numbers(bytes, along.into_iter().map(|(_, v)| v), is_long);

@@ -130,6 +130,8 @@ pub(crate) fn in_order(vertices: usize, triangles: Vec<[u32; 3]>) -> Vec<[u32; 3
         sorted[*place as usize] = triangle;
         *place += 1;
     }
-    starts.windows(2).for_each(|range| sorted[range[0] as usize..range[1] as usize].sort_unstable());
+    let others = |&[_, b, c]: &[u32; 3]| u64::from(b) << 32 | u64::from(c);
+    let of_vertex = starts.windows(2).map(|range| range[0] as usize..range[1] as usize);
+    of_vertex.filter(|range| range.len() > 1).for_each(|range| sorted[range].sort_unstable_by_key(others));
     sorted
 }

@@ -1,6 +1,6 @@
 //! Normals of the terrain at vertices, the same in all tiles that share one.
 
-use crate::mesh::{LAST, OUTSIDE, TileMesh};
+use crate::mesh::{LAST, Node, OUTSIDE, TileMesh};
 use crate::number_hash::NumberMap;
 use crate::place::{HEIGHT_STEPS, SPAN};
 use crate::tile::Tile;
@@ -19,28 +19,33 @@ pub struct BorderNormal {
     pub sum: [f32; 3],
 }
 
-/// Returns for each vertex the sum of the normals of its triangles, east, north and up, each as long as twice the area of its triangle. Triangles
-/// beside the terrain add nothing.
-fn sums(mesh: &TileMesh, tile: Tile, triangles: impl Iterator<Item = [u32; 3]>) -> Vec<[f32; 3]> {
+/// Returns for `count` vertices the sum of the normals of their triangles, east, north and up, each as long as twice the area of its triangle. Triangles
+/// beside the terrain add nothing. `number` returns the place of a vertex in the list, or one beyond.
+fn sums(mesh: &TileMesh, tile: Tile, count: usize, number: impl Fn(u32) -> usize) -> Vec<[f32; 3]> {
     let [east, north] = tile.sides().map(|side| side * RADIUS / SPAN as f64);
     let [x, y, z] = [east * libm::cos(tile.middle()[1]), north, 1.0 / HEIGHT_STEPS];
     // In steps first, then in square metres.
     let scale = [y * z, z * x, x * y];
-    let mut sums = vec![[0.0f64; 3]; mesh.nodes.len()];
-    for triangle in triangles {
+    let mut sums = vec![[0.0f64; 3]; count];
+    for triangle in &mesh.triangles {
+        let numbers = triangle.map(&number);
+        if numbers.iter().all(|number| *number >= count) {
+            continue;
+        }
         let [a, b, c] = triangle.map(|v| mesh.nodes[v as usize]);
         if [a, b, c].iter().any(|node| node.h == OUTSIDE) {
             continue;
         }
-        let from_a = |node: crate::Node| {
+        let from_a = |node: Node| {
             let along = |to: u16, from: u16| f64::from(i32::from(to) - i32::from(from));
             [along(node.u, a.u), along(node.v, a.v), f64::from(node.h) - f64::from(a.h)]
         };
         let (p, q) = (from_a(b), from_a(c));
         let normal = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
-        for v in triangle {
-            let sum = &mut sums[v as usize];
-            (0..3).for_each(|k| sum[k] += normal[k]);
+        for number in numbers {
+            if let Some(sum) = sums.get_mut(number) {
+                (0..3).for_each(|k| sum[k] += normal[k]);
+            }
         }
     }
     sums.into_iter().map(|sum| [0, 1, 2].map(|k| (sum[k] * scale[k]) as f32)).collect()
@@ -48,17 +53,21 @@ fn sums(mesh: &TileMesh, tile: Tile, triangles: impl Iterator<Item = [u32; 3]>) 
 
 /// Returns what a tile adds to the normals on its border.
 pub fn border_normals(mesh: &TileMesh, tile: Tile) -> Vec<BorderNormal> {
-    let is_on_border: Vec<bool> = mesh.nodes.iter().map(|node| node.is_on_border()).collect();
-    let is_at_border = |triangle: &[u32; 3]| triangle.iter().any(|&v| is_on_border[v as usize]);
-    let at_border = mesh.triangles.iter().copied().filter(is_at_border);
-    let on_border = mesh.nodes.iter().zip(sums(mesh, tile, at_border)).filter(|(node, _)| node.is_on_border());
-    on_border.map(|(node, sum)| BorderNormal { place: [node.u, node.v], sum }).collect()
+    let mut places: Vec<[u16; 2]> = Vec::new();
+    let number = |node: &Node| {
+        let number = if node.is_on_border() { places.len() as u32 } else { u32::MAX };
+        places.extend(node.is_on_border().then_some([node.u, node.v]));
+        number
+    };
+    let numbers: Vec<u32> = mesh.nodes.iter().map(number).collect();
+    let sums = sums(mesh, tile, places.len(), |v| numbers[v as usize] as usize);
+    places.into_iter().zip(sums).map(|(place, sum)| BorderNormal { place, sum }).collect()
 }
 
 /// Returns the normals of a tile, of any length. `around` are the borders of the tiles around it, by the columns east and the rows north that they
 /// lie, from south to north and from west to east.
 pub(crate) fn normals(mesh: &TileMesh, tile: Tile, around: &[([i32; 2], Vec<BorderNormal>)]) -> Vec<[f32; 3]> {
-    let mut normals = sums(mesh, tile, mesh.triangles.iter().copied());
+    let mut normals = sums(mesh, tile, mesh.nodes.len(), |v| v as usize);
     let own: Vec<BorderNormal> = (mesh.nodes.iter().zip(&normals))
         .filter(|(node, _)| node.is_on_border())
         .map(|(node, sum)| BorderNormal { place: [node.u, node.v], sum: *sum })

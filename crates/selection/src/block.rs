@@ -4,6 +4,7 @@ use crate::area::is_in;
 use crate::column::Column;
 use crate::disc::Disc;
 use crate::error_bound::{Candidate, ErrorBound, VerticalError};
+use crate::held_points::HeldPoints;
 use crate::mesh_of_points::{Held, MeshOfPoints, NONE, TriangleKey};
 use crate::near_points::{NearestTriangles, PointsByPlace};
 use crate::sample::Sample;
@@ -126,8 +127,8 @@ pub(crate) struct BlockErrors {
     pub(crate) greatest: Option<(u64, [i32; 3])>,
     /// The sum, in the same units.
     pub(crate) sum: u128,
-    /// The triangles that hold points, of those that were asked about, and how many of the block.
-    pub(crate) holding: Vec<(TriangleKey, u64)>,
+    /// The triangles with points inside, of those that were asked about.
+    pub(crate) holding: Vec<HeldPoints>,
 }
 
 impl BlockErrors {
@@ -371,7 +372,7 @@ impl Block {
     }
 
     /// Returns the distances of all points that are not selected.
-    /// Also lists the triangles that hold some, of those that `asks_about` them.
+    /// Also lists the triangles with some inside, of those that it `asks_about`.
     pub(crate) fn errors(&self, asks_about: impl Fn([Site; 3]) -> bool) -> BlockErrors {
         let mut errors = BlockErrors::default();
         for triangle in 0..self.mesh.held.len() {
@@ -380,18 +381,16 @@ impl Block {
                 continue;
             }
             let corners = self.mesh.points(triangle);
-            let mut count = 0;
+            let mut held = asks_about(self.mesh.corners(triangle)).then(|| HeldPoints::none(self.mesh.key(triangle)));
             while point != NONE {
                 let place = self.points[point as usize];
                 let error = VerticalError::of(corners, place).fixed();
                 errors.sum += u128::from(error);
                 errors.add_greatest(Some((error, place)));
+                held.iter_mut().for_each(|held| held.add([place[0], place[1]]));
                 point = self.next[point as usize];
-                count += 1;
             }
-            if asks_about(self.mesh.corners(triangle)) {
-                errors.holding.push((self.mesh.key(triangle), count));
-            }
+            errors.holding.extend(held.filter(|held| held.count > 0));
         }
         errors
     }

@@ -15,6 +15,7 @@ mod block;
 mod column;
 mod disc;
 mod error_bound;
+mod held_points;
 mod hull;
 mod memory;
 mod mesh_of_points;
@@ -33,6 +34,7 @@ mod swap;
 mod tests;
 
 pub use error_bound::{ErrorBound, VerticalError};
+pub use held_points::HeldPoints;
 pub use rounds::{Figures, Selection};
 pub use select::select;
 pub use selected_sites::SelectedSites;

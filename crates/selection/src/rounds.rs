@@ -6,6 +6,7 @@
 
 use crate::block::{Block, BlockErrors, Proposal, SharedCandidate, far_above};
 use crate::error_bound::ErrorBound;
+use crate::held_points::HeldPoints;
 use crate::memory::BlockMemory;
 use crate::mesh_of_points::TriangleKey;
 use crate::near_points::PointsByPlace;
@@ -42,8 +43,8 @@ pub struct Selection<'a> {
     pub sites: SelectedSites<'a>,
     /// Its figures.
     pub figures: Figures,
-    /// The triangles that hold points, of those that the source asks about, in order: their corners in ascending order, and how many.
-    pub holding: Vec<([Site; 3], u64)>,
+    /// The triangles with points inside, of those that the source asks about, in the order of their corners.
+    pub holding: Vec<HeldPoints>,
 }
 
 /// What is known of a block between rounds.
@@ -308,8 +309,10 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         holding.sort_unstable();
         // Several blocks may hold points of one.
         holding.dedup_by(|other, first| {
-            let is_same = other.0 == first.0;
-            first.1 += if is_same { other.1 } else { 0 };
+            let is_same = other.corners == first.corners;
+            if is_same {
+                first.join(other);
+            }
             is_same
         });
         Ok(Selection { sites: self.selected, figures: self.figures, holding })

@@ -122,21 +122,20 @@ fn selected(
     (all, figures)
 }
 
-/// Asserts that the listed triangles are those that hold points which are not selected, with their numbers.
-fn holds_the_others(selected: &BTreeSet<[i32; 3]>, points: &[[i32; 3]], holding: &[([Site; 3], u64)]) {
+/// Asserts that the listed triangles are those with points inside that are not selected, with their numbers.
+fn holds_the_others(selected: &BTreeSet<[i32; 3]>, points: &[[i32; 3]], holding: &[HeldPoints]) {
     let all: Vec<Site> = selected.iter().map(|p| [p[0], p[1]]).collect();
-    let others: Vec<[i32; 3]> = points.iter().filter(|p| !selected.contains(*p)).copied().collect();
-    assert_eq!(holding.iter().map(|(_, count)| count).sum::<u64>(), others.len() as u64);
+    let others: Vec<Site> = points.iter().filter(|p| !selected.contains(*p)).map(|p| [p[0], p[1]]).collect();
+    assert!(holding.iter().map(|held| held.count).sum::<u64>() <= others.len() as u64);
     let (Ok(mesh), true) = (canonical(&all), others.len() < 3_000) else { return };
-    for triangle in mesh.corners().iter().map(|t| t.map(|v| all[v as usize])) {
-        let mut key = triangle;
-        key.sort_unstable();
-        let listed = holding.binary_search_by_key(&key, |(triangle, _)| *triangle).map_or(0, |at| holding[at].1);
-        let place = |p: &[i32; 3], k: usize| orient2d(triangle[k], triangle[(k + 1) % 3], [p[0], p[1]]);
-        let inside = others.iter().filter(|p| (0..3).all(|k| place(p, k) > 0)).count() as u64;
-        let touching = others.iter().filter(|p| (0..3).all(|k| place(p, k) >= 0)).count() as u64;
-        assert!((inside..=touching).contains(&listed), "{triangle:?}: {listed} of {inside} to {touching}");
-    }
+    let of_triangle = |t: &[u32; 3]| {
+        let mut corners = t.map(|v| all[v as usize]);
+        corners.sort_unstable();
+        HeldPoints::of(corners, others.iter().copied())
+    };
+    let mut expected: Vec<HeldPoints> = mesh.corners().iter().map(of_triangle).filter(|held| held.count > 0).collect();
+    expected.sort_unstable();
+    assert_eq!(holding, expected);
 }
 
 /// Does rounds on all points of one sample after the other at once, each from nothing, from these seeds on.

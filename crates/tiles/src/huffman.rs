@@ -42,27 +42,30 @@ fn add_block(writer: &mut BitWriter, block: &[u8], is_last: bool) {
     let codes = codes(&lengths);
     let (fours, rest) = block.as_chunks::<4>();
     for four in fours {
-        four.iter().for_each(|&byte| writer.collect(codes[usize::from(byte)]));
+        // Joined in pairs, so that a code does not wait for the one before.
+        let [a, b, c, d] = four.map(|byte| Bits::of(codes[usize::from(byte)]));
+        writer.collect(a.before(b).before(c.before(d)));
         writer.flush();
     }
     rest.iter().map(|&byte| usize::from(byte)).chain([END]).for_each(|symbol| {
-        writer.collect(codes[symbol]);
+        writer.collect(Bits::of(codes[symbol]));
         writer.flush();
     });
 }
 
 /// Returns how often each symbol occurs in a block.
 fn counts(block: &[u8]) -> [u32; END + 1] {
-    // Two lists, so that a byte does not wait for the one before.
-    let mut lists = [[0u32; END + 1]; 2];
-    let (pairs, rest) = block.as_chunks::<2>();
-    for pair in pairs {
-        lists[0][usize::from(pair[0])] += 1;
-        lists[1][usize::from(pair[1])] += 1;
+    // Several lists, so that no byte waits for an equal one shortly before: of small numbers, every second byte is zero.
+    let mut lists = [[0u32; END + 1]; 8];
+    let (eights, rest) = block.as_chunks::<8>();
+    for eight in eights {
+        lists.iter_mut().zip(eight).for_each(|(list, &byte)| list[usize::from(byte)] += 1);
     }
     rest.iter().for_each(|&byte| lists[0][usize::from(byte)] += 1);
-    let [mut counts, others] = lists;
-    counts.iter_mut().zip(others).for_each(|(count, more)| *count += more);
+    let mut counts = [0; END + 1];
+    for list in lists {
+        counts.iter_mut().zip(list).for_each(|(count, more)| *count += more);
+    }
     counts[END] = 1;
     counts
 }
@@ -156,7 +159,7 @@ fn add_lengths(writer: &mut BitWriter, lengths: &[u8]) {
     LENGTH_ORDER[..named].iter().for_each(|&symbol| writer.add(of_lengths[symbol].into(), 3));
     let codes = codes(&of_lengths);
     for (symbol, extra) in symbols {
-        writer.collect(codes[symbol]);
+        writer.collect(Bits::of(codes[symbol]));
         writer.flush();
         let bits = match symbol {
             16 => 2,
@@ -165,6 +168,25 @@ fn add_lengths(writer: &mut BitWriter, lengths: &[u8]) {
             _ => 0,
         };
         writer.add(extra, bits);
+    }
+}
+
+/// Some bits, the first one last.
+#[derive(Clone, Copy)]
+struct Bits {
+    bits: u64,
+    count: u32,
+}
+
+impl Bits {
+    #[inline(always)]
+    fn of((bits, count): Code) -> Bits {
+        Bits { bits: bits.into(), count: count.into() }
+    }
+
+    #[inline(always)]
+    fn before(self, next: Bits) -> Bits {
+        Bits { bits: self.bits | next.bits << self.count, count: self.count + next.count }
     }
 }
 
@@ -184,9 +206,9 @@ impl BitWriter {
     }
 
     #[inline(always)]
-    fn collect(&mut self, (bits, count): Code) {
-        self.bits |= u64::from(bits) << self.count;
-        self.count += u32::from(count);
+    fn collect(&mut self, Bits { bits, count }: Bits) {
+        self.bits |= bits << self.count;
+        self.count += count;
     }
 
     /// Writes all whole bytes.
@@ -197,7 +219,7 @@ impl BitWriter {
         // All eight in one go, and then back to those that are complete.
         self.bytes.extend(self.bits.to_le_bytes());
         self.bytes.truncate(end);
-        self.bits = self.bits.checked_shr(8 * whole).unwrap_or(0);
+        self.bits >>= 8 * whole;
         self.count -= 8 * whole;
     }
 

@@ -16,6 +16,7 @@
 use crate::plan::job_plan::Plan;
 use delaunay::geometry::Site;
 use delaunay::geometry::predicates::orient2d;
+use selection::HeldPoints;
 use std::collections::HashSet;
 use std::sync::Arc;
 use sys::{Error, Result};
@@ -29,8 +30,12 @@ const SPACINGS_OF_CHOSEN: u64 = 30;
 const SPACINGS_OF_SELECTED: u64 = 50;
 /// A triangle is on ground if it holds at least one of so many points that its area would have if they lay evenly ...
 const SHARE_OF_AREA: u64 = 16;
-/// ... and one of so many that its longest side would have. A thin triangle over a bay holds a few at its ends.
+/// ... and one of so many that its longest side would have, as a thin triangle over a bay has a few at its ends ...
 const SHARE_OF_SIDE: u64 = 8;
+/// ... and they lie in one of so many of its equal cells. A triangle between two strips of ground may hold many, all of them along its border.
+const SHARE_OF_CELLS: u64 = 4;
+/// Of few points, as many as this times the cells that they lie in are enough.
+const POINTS_PER_CELL: u64 = 2;
 
 /// The rule of a job.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -109,9 +114,9 @@ impl HullRule {
         self.on_ground.as_ref().is_some_and(|known| known.contains(&corners))
     }
 
-    /// Tells whether a triangle that holds `count` points is on ground. A few at its border do not make it so.
-    pub(crate) fn has_ground(&self, corners: [Site; 3], count: u64) -> bool {
-        let [a, b, c] = corners;
+    /// Tells whether a triangle that holds such points is on ground. A few, or those at its border, do not make it so.
+    pub(crate) fn has_ground(&self, held: &HeldPoints) -> bool {
+        let HeldPoints { corners: [a, b, c], count, .. } = *held;
         let area = orient2d(a, b, c).unsigned_abs() / 2;
         let longest =
             [[a, b], [b, c], [c, a]].map(|[from, to]| dot(from, to, to) as u64).into_iter().max().unwrap_or(0);
@@ -120,7 +125,9 @@ impl HullRule {
             points * u128::from(self.limit)
                 >= u128::from(size) * u128::from(SPACINGS_OF_SELECTED * SPACINGS_OF_SELECTED)
         };
-        is_enough(u128::from(count * SHARE_OF_AREA), area)
+        let cells = (u64::from(HeldPoints::CELLS) / SHARE_OF_CELLS).min(count / POINTS_PER_CELL);
+        u64::from(held.occupied()) >= cells
+            && is_enough(u128::from(count * SHARE_OF_AREA), area)
             && is_enough(u128::from(count * SHARE_OF_SIDE).pow(2), longest)
     }
 }
@@ -159,13 +166,31 @@ mod tests {
         assert_eq!(rule.flow([[-reach, -reach], [reach, reach], [0, -1]]), Some(0), "the greatest extent");
     }
 
+    /// Returns every so many-th of the lattice points inside a triangle that `is_wanted` takes, at most `count`.
+    fn some_inside(corners: [Site; 3], count: usize, step: usize, is_wanted: impl Fn(Site) -> bool) -> HeldPoints {
+        let all = (0..=80).flat_map(|x| (0..=80).map(move |y| [x, y]));
+        let inside = all.filter(|&p| is_wanted(p) && HeldPoints::of(corners, [p]).count > 0);
+        HeldPoints::of(corners, inside.step_by(step).take(count))
+    }
+
     #[test]
     fn a_few_points_at_its_border_do_not_put_a_triangle_on_ground() {
         // A point for each step, or 2,500 / 2,048 in three bits: half of 1,600 squares.
-        let (rule, corners) = (HullRule::of_points(1, 1, SPACINGS_OF_SELECTED), [[0, 0], [40, 0], [0, 40]]);
-        assert!(rule.has_ground(corners, 62) && !rule.has_ground(corners, 61) && !rule.has_ground(corners, 0));
-        let thin = [[0, 0], [80, 0], [40, 1]];
-        assert!(rule.has_ground(thin, 12) && !rule.has_ground(thin, 11));
+        let (rule, corners) = (HullRule::of_points(1, 1, SPACINGS_OF_SELECTED), [[0, 0], [0, 40], [40, 0]]);
+        let has_ground = |count| rule.has_ground(&some_inside(corners, count, 12, |_| true));
+        assert!(has_ground(62) && !has_ground(61) && !has_ground(0));
+        let thin = [[0, 0], [20, 10], [80, 0]];
+        let has_ground = |count| rule.has_ground(&some_inside(thin, count, 20, |_| true));
+        assert!(has_ground(19) && !has_ground(11));
+    }
+
+    #[test]
+    fn many_points_along_one_side_do_not_put_a_triangle_on_ground() {
+        let (rule, corners) = (HullRule::of_points(1, 1, SPACINGS_OF_SELECTED), [[0, 0], [0, 80], [80, 0]]);
+        let strip = |width: i32| some_inside(corners, usize::MAX, 1, |p| p[0] < width);
+        // A row of cells is ten steps wide. The first has 15 cells, the second 13.
+        assert!(strip(10).count > 3 * 62 && !rule.has_ground(&strip(10)));
+        assert!(rule.has_ground(&strip(20)));
     }
 
     proptest! {

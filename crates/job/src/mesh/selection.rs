@@ -23,7 +23,7 @@ use ground::{CoveredArea, Ground, LowestHeights, MetricLattice, PointCollector};
 use points::Point;
 use rayon::prelude::*;
 use rust_decimal::Decimal;
-use selection::{BYTES_PER_POINT, BlockPoints, ErrorBound, PointSource, SelectedSites, SelectionStore};
+use selection::{BYTES_PER_POINT, BlockPoints, ErrorBound, HeldPoints, PointSource, SelectedSites, SelectionStore};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use sys::{fault, interrupt};
@@ -184,10 +184,9 @@ impl<'a> PointsInBlocks<'a> {
         self.ground.as_ref()
     }
 
-    /// Returns the triangles on ground among those that hold so many points.
-    pub(crate) fn on_ground(&self, holding: Vec<([Site; 3], u64)>) -> Vec<[Site; 3]> {
-        let has_ground = |(corners, count): &([Site; 3], u64)| self.rule.has_ground(*corners, *count);
-        holding.into_iter().filter(has_ground).map(|(corners, _)| corners).collect()
+    /// Returns the triangles on ground among those that hold points.
+    pub(crate) fn on_ground(&self, holding: &[HeldPoints]) -> Vec<[Site; 3]> {
+        holding.iter().filter(|held| self.rule.has_ground(held)).map(|held| held.corners).collect()
     }
 
     /// Returns the sites of a block, and how many points were dropped because another has the same x and y.

@@ -4,17 +4,15 @@
 //! as often. So each sample is looked at twice, the second time with a quarter of its points, and what changes then is taken to change
 //! in the same way up to the density of all points.
 
-use crate::mesh::selection::{error_bound, metric_lattice};
-use crate::plan::budget::working_memory;
+use crate::mesh::selection::error_bound;
 use crate::plan::job_plan::Plan;
 use crate::preflight::kept_points::KeptPoints;
-use crate::preflight::sampled_points::sampled_points;
+use crate::preflight::sampled_points::{sampled_points, wanted_of};
 use crate::preflight::selection_estimate::selected_points;
 use crate::progress::number_text::{grouped, mebibytes, rough};
 use crate::publish::contours::check::TerrainLevels;
 use delaunay::geometry::Site;
 use delaunay::triangulation::canonical;
-use ground::{BYTES_PER_CELL, Ground};
 use points::surface::{MeshOf, Surface};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -172,10 +170,7 @@ impl ContourSample {
 /// Returns the figures of the mesh that the job would make of some points alone.
 fn figures_of(plan: &Plan, options: &ContourOptions, points: &[[i32; 3]]) -> Result<MeshFigures> {
     interrupt::check()?;
-    let mut vertices = points.to_vec();
-    if plan.options.input.finds_ground() {
-        vertices = on_ground(plan, vertices)?;
-    }
+    let mut vertices = wanted_of(plan, points.to_vec())?;
     if let Some(bound) = error_bound(plan).map_err(config_error)? {
         vertices = selected_points(&vertices, bound)?;
     }
@@ -213,18 +208,6 @@ fn figures_of(plan: &Plan, options: &ContourOptions, points: &[[i32; 3]]) -> Res
 
 fn config_error(error: crate::Error) -> Error {
     Error::Config(error.to_string())
-}
-
-/// Returns those of some points that are on the ground, as far as these points alone tell. All stay where their ground takes too much memory.
-fn on_ground(plan: &Plan, mut points: Vec<[i32; 3]>) -> Result<Vec<[i32; 3]>> {
-    let sizes = plan.options.input.bare_earth;
-    let most = working_memory(&plan.options) / BYTES_PER_CELL / rayon::current_num_threads() as u64;
-    if let Some(ground) =
-        Ground::of_points(metric_lattice(plan), points.iter().copied(), sizes, most, interrupt::check)?
-    {
-        points.retain(|point| ground.has(*point));
-    }
-    Ok(points)
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! Points of some chunks of the inputs, for estimates of what the mesh will be like.
 
+use crate::mesh::selection::metric_lattice;
+use crate::plan::budget::working_memory;
 use crate::plan::job_plan::Plan;
+use ground::{BYTES_PER_CELL, Ground};
 use points::Point;
 use rayon::prelude::*;
 use sys::{Error, Result, interrupt};
@@ -38,4 +41,22 @@ pub(crate) fn sampled_points(plan: &Plan) -> Result<Vec<Vec<[i32; 3]>>> {
     };
     let wanted: Vec<(usize, usize)> = all.into_iter().skip(step / 2).step_by(step).collect();
     wanted.par_iter().map(of_chunk).collect()
+}
+
+/// Returns those of some points that vertices are selected from: all, or those on the ground as far as these points alone tell. All stay where their
+/// ground takes too much memory.
+///
+/// # Errors
+/// [`Error::Interrupted`].
+pub(crate) fn wanted_of(plan: &Plan, mut points: Vec<[i32; 3]>) -> Result<Vec<[i32; 3]>> {
+    let input = &plan.options.input;
+    if !input.finds_ground() {
+        return Ok(points);
+    }
+    let most = working_memory(&plan.options) / BYTES_PER_CELL / rayon::current_num_threads() as u64;
+    let all = points.iter().copied();
+    if let Some(ground) = Ground::of_points(metric_lattice(plan), all, input.bare_earth, most, interrupt::check)? {
+        points.retain(|point| ground.has(*point));
+    }
+    Ok(points)
 }

@@ -2,7 +2,7 @@
 
 use crate::mesh::selection::bound_in_steps;
 use crate::plan::job_plan::Plan;
-use crate::preflight::sampled_points::sampled_points;
+use crate::preflight::sampled_points::{sampled_points, wanted_of};
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::triangulation::canonical;
@@ -18,6 +18,7 @@ use sys::{Error, Result, interrupt};
 pub fn estimated_vertices(plan: &Plan, kept: u64, bounds: &[f64]) -> Result<Vec<u64>> {
     let samples = sampled_points(plan)?;
     let points: u64 = samples.iter().map(|points| points.len() as u64).sum();
+    let samples = samples.into_par_iter().map(|points| wanted_of(plan, points)).collect::<Result<Vec<_>>>()?;
     let estimate = |&units: &f64| {
         let bound = bound_in_steps(plan, units)?;
         let selected = samples.par_iter().map(|points| selected_of(points, bound)).sum::<Result<u64>>()?;

@@ -1,7 +1,7 @@
 //! Where points of the lattice lie on the tiles of a zoom.
 //!
 //! To project every point takes longer than all else. So places are computed at the corners of square cells of the lattice, and between these
-//! by bilinear interpolation. A cell is a sixteenth of a tile wide at most, and the middles of its sides are compared with their true places. Where the
+//! by bilinear interpolation. A cell is a quarter of a tile wide at most, and the middles of its sides are compared with their true places. Where the
 //! map of the projection bends more than [`MOST_BEND`] there, as it does near a pole, cells are halved until it does not. Cells are those of the lattice,
 //! not of tiles of the job, so that a point has the same place in all of them.
 
@@ -15,7 +15,7 @@ use tiles::frame::Extras;
 use tiles::tiles3d::globe::{Globe, NotPlaced};
 
 /// The sides of cells in a tile, at least.
-const CELLS_PER_TILE: f64 = 16.0;
+const CELLS_PER_TILE: f64 = 4.0;
 
 /// The longest side of a cell in metres.
 const LONGEST_CELL: f64 = 2048.0;

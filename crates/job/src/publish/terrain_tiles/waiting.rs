@@ -1,13 +1,19 @@
 //! Files in which pieces and meshes of tiles wait.
 
+use crate::durable::directory::JobDirectory;
 use crate::durable::waiting_file::WaitingFile;
 use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut, cast_slice, cast_slice_mut, zeroed_vec};
 use quantized_mesh::{BorderNormal, Node, OUTSIDE, Piece, TileMesh};
-use std::path::Path;
 use sys::Result;
 
-/// Records in a file. Threads may add some in any order.
-pub(super) struct WaitingRecords(WaitingFile);
+/// Records in files. Threads may add some in any order. Those that write to one file would wait for each other, so there are several.
+pub(super) struct WaitingRecords(Vec<WaitingFile>);
+
+/// The most files of records.
+const MOST_FILES: usize = 8;
+
+/// The place of a record in its file has so many bits; the number of the file is above them.
+const PLACE_BITS: u32 = 56;
 
 /// What a record has, at its beginning.
 #[repr(C)]
@@ -27,12 +33,13 @@ impl Counts {
 }
 
 impl WaitingRecords {
-    /// Makes the file at `path`.
+    /// Makes the files of this name.
     ///
     /// # Errors
     /// [`sys::Error::Io`].
-    pub(super) fn at(path: &Path) -> Result<WaitingRecords> {
-        WaitingFile::at(path).map(WaitingRecords)
+    pub(super) fn create(directory: &JobDirectory, name: &str) -> Result<WaitingRecords> {
+        let file = |number: usize| WaitingFile::at(&directory.scratch(&format!("{name}.{number}")));
+        (0..rayon::current_num_threads().clamp(1, MOST_FILES)).map(file).collect::<Result<_>>().map(WaitingRecords)
     }
 
     /// Adds a piece, and returns its place.
@@ -62,13 +69,15 @@ impl WaitingRecords {
         };
         let corners: &[u8] = if counts.is_short() { cast_slice(&short) } else { cast_slice(triangles) };
         let parts = [bytes_of(&counts), cast_slice(border), cast_slice(nodes), corners];
-        let first = self.0.reserve(parts.iter().map(|part| part.len() as u64).sum());
+        let number = rayon::current_thread_index().unwrap_or(0) % self.0.len();
+        let file = &self.0[number];
+        let first = file.reserve(parts.iter().map(|part| part.len() as u64).sum());
         let mut at = first;
         for part in parts {
-            self.0.write(part, at)?;
+            file.write(part, at)?;
             at += part.len() as u64;
         }
-        Ok(first)
+        Ok((number as u64) << PLACE_BITS | first)
     }
 
     /// Reads a piece.
@@ -80,7 +89,8 @@ impl WaitingRecords {
         at += u64::from(counts.border) * size_of::<BorderNormal>() as u64;
         let nodes = self.list(&mut at, counts.nodes)?;
         let triangles = self.triangles(&mut at, counts)?;
-        Ok(Piece { nodes, triangles, corners: counts.corners.map(|corner| (corner != OUTSIDE).then_some(corner)) })
+        let corners = counts.corners.map(|corner| (corner != OUTSIDE).then_some(corner));
+        Ok(Piece { nodes, triangles, corners })
     }
 
     /// Reads a mesh.
@@ -113,7 +123,7 @@ impl WaitingRecords {
 
     fn counts(&self, at: u64) -> Result<(Counts, u64)> {
         let mut counts = Counts::zeroed();
-        self.0.read(bytes_of_mut(&mut counts), at)?;
+        self.read(bytes_of_mut(&mut counts), at)?;
         Ok((counts, at + size_of::<Counts>() as u64))
     }
 
@@ -128,16 +138,20 @@ impl WaitingRecords {
     /// Reads so many things, and goes on behind them.
     fn list<T: Pod>(&self, at: &mut u64, count: u32) -> Result<Vec<T>> {
         let mut list = zeroed_vec(count as usize);
-        self.0.read(cast_slice_mut(&mut list), *at)?;
+        self.read(cast_slice_mut(&mut list), *at)?;
         *at += size_of_val(&list[..]) as u64;
         Ok(list)
     }
 
-    /// Removes the file.
+    fn read(&self, bytes: &mut [u8], at: u64) -> Result<()> {
+        self.0[(at >> PLACE_BITS) as usize].read(bytes, at & ((1 << PLACE_BITS) - 1))
+    }
+
+    /// Removes the files.
     ///
     /// # Errors
     /// [`sys::Error::Io`].
     pub(super) fn discard(self) -> Result<()> {
-        self.0.discard()
+        self.0.into_iter().try_for_each(WaitingFile::discard)
     }
 }

@@ -174,7 +174,7 @@ impl<'a> TerrainWork<'a> {
         is_mirrored: bool,
         done: &(dyn Fn(u64) + Sync),
     ) -> Result<(WaitingRecords, Vec<WaitingPiece>)> {
-        let (file, list) = (WaitingRecords::at(&directory.scratch("terrain.pieces"))?, Mutex::new(Vec::new()));
+        let (file, list) = (WaitingRecords::create(directory, "terrain.pieces")?, Mutex::new(Vec::new()));
         self.tiles.par_iter().with_max_len(1).try_for_each(|tile| {
             interrupt::check()?;
             let mut mesh = lattice_mesh(&directory.output().tile(tile.tile.number()), self.frame)?;

@@ -72,7 +72,7 @@ impl Zoom {
         finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         list.sort_unstable();
-        let file = WaitingRecords::at(&directory.scratch(&format!("terrain.{zoom}.meshes")))?;
+        let file = WaitingRecords::create(directory, &format!("terrain.{zoom}.meshes"))?;
         let groups: Vec<&[WaitingPiece]> = list.chunk_by(|a, b| a.tile == b.tile).collect();
         let load = |group: &&[WaitingPiece]| {
             let vertices = group.iter().map(|piece| piece.vertices).sum::<u64>();
@@ -127,7 +127,7 @@ impl Zoom {
         finish_tile: &(dyn Fn() + Sync),
     ) -> Result<Zoom> {
         let zoom = self.zoom.saturating_sub(1);
-        let file = WaitingRecords::at(&directory.scratch(&format!("terrain.{zoom}.meshes")))?;
+        let file = WaitingRecords::create(directory, &format!("terrain.{zoom}.meshes"))?;
         let mut by_parent: Vec<(Tile, &WaitingTile)> =
             self.tiles.iter().map(|tile| (tile.tile.parent(), tile)).collect();
         by_parent.sort_unstable_by_key(|(parent, child)| (*parent, child.tile));

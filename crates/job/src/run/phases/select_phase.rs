@@ -76,7 +76,7 @@ pub(crate) fn select_vertices(job: &Job) -> Result<()> {
     }
     let selection = bound.map(|bound| select(&source, bound)).transpose()?;
     let (sites, figures, on_ground) = match selection {
-        Some(Selection { sites, figures, holding }) => (Some(sites), Some(figures), source.on_ground(holding)),
+        Some(Selection { sites, figures, holding }) => (Some(sites), Some(figures), source.on_ground(&holding)),
         None => (None, None, Vec::new()),
     };
     if !job.plan.options.input.finds_ground() {
