@@ -120,13 +120,6 @@ fn the_hull_is_trimmed_where_there_are_no_points() {
     let cloud: Cloud =
         all.filter(|&(x, y)| is_land(x, y)).map(|(x, y)| [place(x, y)[0], place(x, y)[1], x * y * 31 % 17]).collect();
     let file = [clouds::write(folder.path(), "bay.csv", &cloud)];
-    let area = |job: &Job| {
-        let twice = |mesh: &[[[f64; 3]; 3]]| -> f64 {
-            mesh.iter().map(|[a, b, c]| ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs()).sum()
-        };
-        let files = files_below(&job.out().join("tiles"));
-        files.iter().map(|path| twice(&mesh_of(path))).sum::<f64>() / 2.0
-    };
     let plain = || Job::on(&file).with("output", "compression = \"none\"");
     let whole = within(plain().with("output", "hull = \"whole\""), "5");
     let (wanted, bay) = (plain(), within(plain(), "5"));
@@ -145,6 +138,33 @@ fn the_hull_is_trimmed_where_there_are_no_points() {
         assert_eq!(other.report()["hull_triangles"], report["hull_triangles"]);
         assert!((area(&other) - trimmed).abs() < 1e-6);
     }
+}
+
+/// Ground in strips: triangles from one to another hold points, all of them at their ends.
+#[test]
+fn the_hull_is_trimmed_between_strips_of_ground() {
+    let Some(shared) = crate::common::shared() else { return };
+    let plain = || {
+        let job = Job::on(&[shared.join("data/append-bug.laz")]).with("input", "classes = [2]");
+        job.with("output", "compression = \"none\"")
+    };
+    let shown = |job: Job| {
+        job.report();
+        area(&job)
+    };
+    let wanted = shown(plain());
+    assert!(shown(plain().with("output", "hull = \"whole\"")) > 20.0 * wanted);
+    for bound in ["0.05", "0.2", "1.0"] {
+        let trimmed = shown(within(plain(), bound));
+        assert!((0.9 * wanted..1.1 * wanted).contains(&trimmed), "{bound}: {trimmed} of {wanted}");
+    }
+}
+
+/// Returns the area in the plane of the triangles that a job shows.
+fn area(job: &Job) -> f64 {
+    let twice = |[a, b, c]: &[[f64; 3]; 3]| ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs();
+    let files = files_below(&job.out().join("tiles"));
+    files.iter().map(|path| mesh_of(path).iter().map(twice).sum::<f64>()).sum::<f64>() / 2.0
 }
 
 /// Returns the triangles of a GLB in the plane of its tile: x, y and height.
