@@ -86,7 +86,7 @@ mod tests {
             let cells = HeldPoints::of(corners, all(1).filter(of_square)).occupied();
             assert_eq!(cells, if x + y < 210 { 2 } else { u32::from(x + y == 210) }, "{x} {y}");
         }
-        let row = HeldPoints::of(corners, all(1).filter(|p| p[1] == 1));
+        let row = HeldPoints::of(corners, all(1).filter(|p| p[1] < 30));
         assert_eq!(row.occupied(), 15);
     }
 
