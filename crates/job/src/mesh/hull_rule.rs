@@ -168,7 +168,8 @@ mod tests {
 
     /// Returns every so many-th of the lattice points inside a triangle that `is_wanted` takes, at most `count`.
     fn some_inside(corners: [Site; 3], count: usize, step: usize, is_wanted: impl Fn(Site) -> bool) -> HeldPoints {
-        let all = (0..=80).flat_map(|x| (0..=80).map(move |y| [x, y]));
+        let [width, height] = [0, 1].map(|axis: usize| corners.map(|corner| corner[axis]).into_iter().max().unwrap());
+        let all = (0..width).flat_map(|x| (0..height).map(move |y| [x, y]));
         let inside = all.filter(|&p| is_wanted(p) && HeldPoints::of(corners, [p]).count > 0);
         HeldPoints::of(corners, inside.step_by(step).take(count))
     }
@@ -179,9 +180,10 @@ mod tests {
         let (rule, corners) = (HullRule::of_points(1, 1, SPACINGS_OF_SELECTED), [[0, 0], [0, 40], [40, 0]]);
         let has_ground = |count| rule.has_ground(&some_inside(corners, count, 12, |_| true));
         assert!(has_ground(62) && !has_ground(61) && !has_ground(0));
-        let thin = [[0, 0], [20, 10], [80, 0]];
-        let has_ground = |count| rule.has_ground(&some_inside(thin, count, 20, |_| true));
-        assert!(has_ground(19) && !has_ground(11));
+        // Of a thin one the longest side decides: 80 spacings, of which there must be one of eight.
+        let (rule, thin) = (HullRule::of_points(1, 100, SPACINGS_OF_SELECTED), [[0, 0], [400, 10], [800, 0]]);
+        let has_ground = |count| rule.has_ground(&some_inside(thin, count, 300, |_| true));
+        assert!(has_ground(11) && !has_ground(10));
     }
 
     #[test]
