@@ -76,7 +76,7 @@ fn a_job_that_the_address_space_does_not_hold_is_refused_with_the_limit_by_name(
     let text = clouds::write(folder.path(), "cloud.csv", &clouds::uniform(100_000, 100_000, 4));
     let job = Job::on(&[&text]).threads(2);
     let config = job.config();
-    let said = gdt_batch_within_kib(150 << 10, job.folder(), &[config.to_str().unwrap()]);
+    let said = gdt_batch_within_kib(200 << 10, job.folder(), &[config.to_str().unwrap()]);
     said.refused(1, &["not enough memory", "the job takes about", "ulimit -v", "raise it"]);
 }
 
