@@ -436,7 +436,9 @@ fn output_of(path: &Path) -> Result<PathBuf> {
 #[cfg(feature = "viewer")]
 fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
     use gdt_batch::view::{View, browser};
-    if !tiles::page::is_built_in() {
+    let has_page = tiles::page::is_built_in();
+    // Pages of other servers need the files alone.
+    if !has_page && !options.cors {
         return Err(sys::Error::Config(tiles::page::NOT_BUILT_IN.into()).into());
     }
     let wanted = std::net::SocketAddr::new(options.address, options.port);
@@ -448,7 +450,7 @@ fn view_output(options: &ViewOptions, print: PrintOptions) -> Result<ExitCode> {
     } else {
         print_result(&view, print)?;
     }
-    if let Some(Err(why)) = (!options.no_open).then(|| browser::open(&view.url)) {
+    if let Some(Err(why)) = (has_page && !options.no_open).then(|| browser::open(&view.url)) {
         say(&format!("no browser was opened ({why}): open {} yourself", view.url));
     }
     view.run()?;

@@ -22,7 +22,7 @@ use crate::view::results::Results;
 use crate::view::server::Server;
 use crate::view::site::Site;
 use tiles::file_names::OutputFiles;
-use tiles::page::{imagery_of, page_for};
+use tiles::page::{imagery_of, is_built_in, page_for};
 
 /// A terrain that waits for browsers: `Display` is for people, `Serialize` for programs.
 #[derive(Serialize)]
@@ -43,7 +43,7 @@ impl View {
     /// names `hosts` too. Pages of other servers may read the results if `cors` is set.
     ///
     /// # Errors
-    /// [`sys::Error::Config`] if no job has written to the directory, the page is not built in, or the address is not one of this machine.
+    /// [`sys::Error::Config`] if no job has written to the directory, or the address is not one of this machine.
     /// [`verify::Error::Unfinished`] if the job is not done. [`Error::Port`] if another program has the port.
     pub fn open(directory: &Path, wanted: SocketAddr, hosts: &[String], cors: bool) -> Result<View> {
         let terrain = terrain_in(directory)?;
@@ -52,7 +52,9 @@ impl View {
         let bound = listener.local_addr().map_err(sys::Error::io("listen on", wanted.to_string()))?;
         let (results, page, hosts) = (
             Results::new(&root),
-            page_for(terrain, imagery_of(&OutputFiles::new(&root).page()).as_ref())?,
+            is_built_in()
+                .then(|| page_for(terrain, imagery_of(&OutputFiles::new(&root).page()).as_ref()))
+                .transpose()?,
             Hosts::new(hosts),
         );
         let site = Site { results, root, page, hosts, cors };
@@ -77,7 +79,14 @@ impl View {
 
 impl fmt::Display for View {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{} is shown at {}", self.directory.display(), self.url)?;
+        let (directory, url) = (self.directory.display(), &self.url);
+        match is_built_in() {
+            true => writeln!(f, "{directory} is shown at {url}")?,
+            false => writeln!(
+                f,
+                "the files in {directory} are at {url}; this build of gdt-batch has no page that shows them"
+            )?,
+        }
         if self.is_public {
             writeln!(f, "any machine that can reach this one can read the results in it")?;
         }

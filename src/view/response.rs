@@ -51,7 +51,7 @@ fn answer(site: &Site, request: &Request, stays_here: bool) -> Response {
         return with(text(405, "only GET and HEAD are answered\n"), "Allow", "GET, HEAD");
     }
     match site.target(request.uri().path()) {
-        Target::Page => page(site, request),
+        Target::Page(page) => answer_page(page, request),
         Target::File(path, file) => file_response(request, &path, file, stays_here)
             .unwrap_or_else(|error| text(500, &format!("the file cannot be read: {error}\n"))),
         Target::Nothing => text(404, "there is no such file\n"),
@@ -71,8 +71,8 @@ fn text(status: u16, text: &str) -> Response {
     plain(Cursor::new(text.to_owned()), text.len() as u64, status, "text/plain; charset=utf-8")
 }
 
-fn page(site: &Site, request: &Request) -> Response {
-    let (page, kind) = (site.page.clone(), "text/html; charset=utf-8");
+fn answer_page(page: String, request: &Request) -> Response {
+    let kind = "text/html; charset=utf-8";
     if takes_gzip(request) {
         return packed(Cursor::new(page), kind);
     }

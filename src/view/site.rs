@@ -14,8 +14,8 @@ pub(super) struct Site {
     pub(super) root: PathBuf,
     /// The files that may be served.
     pub(super) results: Results,
-    /// The page that shows it.
-    pub(super) page: String,
+    /// The page that shows it, if it is built in.
+    pub(super) page: Option<String>,
     /// Whom it is for.
     pub(super) hosts: Hosts,
     /// Whether pages of other servers may read the files.
@@ -24,7 +24,7 @@ pub(super) struct Site {
 
 /// What a request is for.
 pub(super) enum Target {
-    Page,
+    Page(String),
     File(PathBuf, File),
     Nothing,
 }
@@ -34,7 +34,7 @@ impl Site {
     pub(super) fn target(&self, url: &str) -> Target {
         let Some(names) = names_in(url) else { return Target::Nothing };
         if names.is_empty() || names == ["index.html"] {
-            return Target::Page;
+            return self.page.clone().map_or(Target::Nothing, Target::Page);
         }
         self.file(&names).map_or(Target::Nothing, |(path, file)| Target::File(path, file))
     }
@@ -71,6 +71,23 @@ fn name_of(encoded: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn without_a_page_the_root_is_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().canonicalize().unwrap();
+        let site = |page: Option<&str>| Site {
+            results: Results::new(&root),
+            root: root.clone(),
+            page: page.map(Into::into),
+            hosts: Hosts::new(&[]),
+            cors: true,
+        };
+        for url in ["/", "/index.html"] {
+            assert!(matches!(site(None).target(url), Target::Nothing), "{url}");
+            assert!(matches!(site(Some("<p>")).target(url), Target::Page(page) if page == "<p>"), "{url}");
+        }
+    }
 
     #[test]
     fn a_path_has_plain_names_only() {

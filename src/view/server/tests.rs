@@ -45,7 +45,7 @@ impl Rig {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         let address = listener.local_addr().unwrap();
         let hosts = Hosts::new(&["maps.example".into()]);
-        let site = Site { results: Results::new(&root), root, page: "<p>the page".into(), hosts, cors };
+        let site = Site { results: Results::new(&root), root, page: Some("<p>the page".into()), hosts, cors };
         let server = Server { stillness, ..Server::new(listener, site).unwrap() };
         thread::spawn(move || server.run());
         Rig { folder, address }
