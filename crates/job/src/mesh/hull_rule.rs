@@ -32,9 +32,9 @@ const SPACINGS_OF_SELECTED: u64 = 50;
 const SHARE_OF_AREA: u64 = 16;
 /// ... and one of so many that its longest side would have, as a thin triangle over a bay has a few at its ends ...
 const SHARE_OF_SIDE: u64 = 8;
-/// ... and they lie in one of so many of its equal cells. A triangle between two strips of ground may hold many, all of them along its border.
+/// ... and if one of so many of its cells holds a point: a triangle between two strips of ground may hold many, all of them along its border ...
 const SHARE_OF_CELLS: u64 = 4;
-/// Of few points, as many as this times the cells that they lie in are enough.
+/// ... or, where it holds few, if no more than so many share a cell on average.
 const POINTS_PER_CELL: u64 = 2;
 
 /// The rule of a job.
