@@ -249,6 +249,25 @@ fn a_terrain_around_too_much_of_the_globe_is_refused_before_it_is_read() {
     job("bounds = [-4000000.0, 0.0, 4000000.0, 5000000.0]").run_with(&["check"]).succeeded();
 }
 
+/// Corners of the box around some points may lie far nearer to the pole than any of them, and so at other longitudes: each point decides.
+#[test]
+fn a_terrain_near_a_pole_is_as_wide_as_its_points() {
+    let folder = tempfile::tempdir().unwrap();
+    // Three pieces of 15 km on 50 degrees of longitude. The corners of the box around them are 116 degrees apart.
+    let piece = |[east, north]: [i64; 2]| {
+        (0..225)
+            .map(move |i| [east + i % 15 * 1_000 + i * i % 7 * 50, north + i / 15 * 1_000 + i * 3 % 5 * 60, i * i % 40])
+    };
+    let cloud: clouds::Cloud =
+        [[-280_000, -600_000], [265_000, -600_000], [-7_000, -190_000]].into_iter().flat_map(piece).collect();
+    let file = clouds::write(folder.path(), "pole.csv", &cloud);
+    let job = Job::on(&[&file]).with("input", "crs = \"EPSG:3413\"");
+    let job = job.with("output", &format!("max_edge = 20000.0\n{TERRAIN}"));
+    job.run_with(&["check"]).succeeded();
+    let terrain = &job.report()["terrain"];
+    assert!(number(&terrain["tiles"]) > 20, "{terrain}");
+}
+
 /// Returns a sparse terrain of 20 km with places that have so many points each, on 900 m.
 fn crowded(places: &[[i64; 2]], points: usize) -> clouds::Cloud {
     let mut random = Random(11);

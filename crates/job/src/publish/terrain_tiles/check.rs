@@ -4,14 +4,11 @@ use crate::plan::globe_system::globe_system;
 use crate::plan::job_plan::Plan;
 use crate::plan::terrain_crowd::scheme_of;
 use crate::publish::terrain_tiles::globe_grid::Place;
-use crate::publish::terrain_tiles::limits::{beyond_latitudes, refused};
+use crate::publish::terrain_tiles::limits::{MOST_LONGITUDES, beyond_latitudes, beyond_longitudes, refused};
 use crs::geoid::Geoid;
 use delaunay::geometry::Bounds;
 use sys::{Error, Result};
 use tiles::tiles3d::globe::Globe;
-
-/// The widest terrain in degrees of longitude.
-const MOST_LONGITUDES: f64 = 90.0;
 
 /// Returns the way of the job to the globe.
 ///
@@ -42,7 +39,8 @@ pub(crate) fn check_terrain(plan: &Plan) -> Result<()> {
     if highest > scheme.most_latitude() {
         return Err(beyond_latitudes(scheme, highest));
     }
-    longitudes_within(longitudes.max(claimed(plan, &globe, |place| longitudes_from(&middle, place))))
+    let widest = longitudes.max(claimed(plan, &globe, |place| place.longitudes_from(&middle)));
+    if widest > MOST_LONGITUDES { Err(beyond_longitudes(widest)) } else { Ok(()) }
 }
 
 /// Returns the greatest value of `measure` that a point has for sure by the boxes of the inputs: each has a point on each side.
@@ -70,41 +68,8 @@ fn sides(bounds: Bounds<2>) -> impl Iterator<Item = Bounds<2>> {
     })
 }
 
-/// Returns how many degrees of longitude a terrain spans that reaches as far to both sides of its middle as to this place.
-fn longitudes_from(middle: &Place, place: Place) -> f64 {
-    2.0 * (place.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs()
-}
-
-/// # Errors
-/// [`Error::Config`] if a terrain spans more degrees of longitude than terrain tiles take.
-fn longitudes_within(widest: f64) -> Result<()> {
-    if widest > MOST_LONGITUDES {
-        return Err(refused(&format!(
-            "the terrain spans about {widest:.0} degrees of longitude; {MOST_LONGITUDES} degrees is the limit"
-        )));
-    }
-    Ok(())
-}
-
 /// Returns places at equal distances in a box, so many times as far apart as its sides are long.
 fn grid_over(bounds: Bounds<2>, parts: i64) -> impl Iterator<Item = [i32; 2]> {
     let along = move |axis: usize, part: i64| (i64::from(bounds.min[axis]) + bounds.extent(axis) * part / parts) as i32;
     (0..=parts).flat_map(move |i| (0..=parts).map(move |j| [along(0, i), along(1, j)]))
-}
-
-/// Checks that a terrain whose tiles lie within `boxes` around `middle` is not around the globe. How near it is to a pole, each point tells.
-///
-/// # Errors
-/// [`Error::Config`] if it is.
-pub(super) fn check_longitudes(
-    plan: &Plan,
-    globe: &Globe,
-    middle: &Place,
-    boxes: impl Iterator<Item = Bounds<2>>,
-) -> Result<()> {
-    const PARTS: i64 = 2;
-    // Corners of a box may lie outside the range of a projection in which all points are.
-    let places =
-        boxes.flat_map(|bounds| grid_over(bounds, PARTS)).filter_map(|place| Place::of(plan, globe, place).ok());
-    longitudes_within(places.map(|place| longitudes_from(middle, place)).fold(0.0, f64::max))
 }

@@ -6,7 +6,7 @@
 //! not of tiles of the job, so that a point has the same place in all of them.
 
 use crate::plan::job_plan::Plan;
-use crate::publish::terrain_tiles::limits::beyond_latitudes;
+use crate::publish::terrain_tiles::limits::{MOST_LONGITUDES, beyond_latitudes, beyond_longitudes};
 use quantized_mesh::{GridPoint, SPAN, Scheme, Tile, TileGrid};
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -50,6 +50,11 @@ impl Place {
     pub(super) fn beside(self, longitude: f64) -> Place {
         let turns = ((longitude - self.longitude) / (2.0 * PI)).round();
         Place { longitude: self.longitude + turns * 2.0 * PI, ..self }
+    }
+
+    /// Returns how many degrees of longitude a terrain spans that reaches as far to both sides of its middle as to this place.
+    pub(super) fn longitudes_from(self, middle: &Place) -> f64 {
+        2.0 * (self.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs()
     }
 }
 
@@ -111,16 +116,20 @@ impl<'a> GlobeGrid<'a> {
     /// Returns the grid points of lattice points.
     ///
     /// # Errors
-    /// [`Error::Config`] if the place of one is not known, or too near to a pole.
+    /// [`Error::Config`] if the place of one is not known, too near to a pole, or too far east or west.
     pub(super) fn points(&self, positions: &[[i32; 3]]) -> Result<Vec<GridPoint>> {
         let mut known = KnownPlaces::default();
         let mut grid = TileGrid::new(self.scheme, self.zoom);
         let most_latitude = self.scheme.most_latitude().to_radians();
+        let most_longitude = MOST_LONGITUDES.to_radians() / 2.0;
         let mut points = Vec::with_capacity(positions.len());
         for &[x, y, z] in positions {
             let place = self.near([x, y], &mut known)?;
             if place.latitude.abs() > most_latitude {
                 return Err(beyond_latitudes(self.scheme, place.latitude.to_degrees().abs()));
+            }
+            if (place.longitude - self.middle.longitude).abs() > most_longitude {
+                return Err(beyond_longitudes(place.longitudes_from(&self.middle)));
             }
             let height =
                 (self.extras.offset[2] + self.extras.resolution_z * f64::from(z)) * self.extras.metres_per_unit_z;

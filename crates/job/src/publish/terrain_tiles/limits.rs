@@ -17,6 +17,16 @@ pub(super) fn beyond_latitudes(scheme: Scheme, highest: f64) -> Error {
     }
 }
 
+/// The widest terrain in degrees of longitude.
+pub(super) const MOST_LONGITUDES: f64 = 90.0;
+
+/// Returns the error about a terrain that spans so many degrees of longitude.
+pub(super) fn beyond_longitudes(widest: f64) -> Error {
+    refused(&format!(
+        "the terrain spans about {widest:.0} degrees of longitude; {MOST_LONGITUDES} degrees is the limit"
+    ))
+}
+
 /// Returns the error about a terrain that terrain tiles cannot have.
 pub(super) fn refused(why: &str) -> Error {
     Error::Config(format!(

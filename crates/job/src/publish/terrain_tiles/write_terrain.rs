@@ -7,7 +7,7 @@ use crate::plan::job_plan::Plan;
 use crate::plan::terrain_crowd::{TerrainCrowd, scheme_of};
 use crate::publish::raster::tile_meshes::{TileBox, boxes, lattice_mesh};
 use crate::publish::side_files::EachTile;
-use crate::publish::terrain_tiles::check::{check_longitudes, globe_of};
+use crate::publish::terrain_tiles::check::globe_of;
 use crate::publish::terrain_tiles::globe_grid::{GlobeGrid, Place};
 use crate::publish::terrain_tiles::lakes::{shore_memory, shores_of};
 use crate::publish::terrain_tiles::limits::refused;
@@ -119,7 +119,6 @@ impl<'a> TerrainWork<'a> {
         let scheme = self.scheme;
         let middle = bounds.middle();
         let place = Place::of(self.plan, &self.globe, middle).map_err(|why| refused(&why))?;
-        check_longitudes(self.plan, &self.globe, &place, self.tiles.iter().map(|tile| tile.bounds))?;
         let grid = |zoom: u8| GlobeGrid::new(self.plan, &self.globe, scheme, zoom, place);
         // Any zoom tells the area of a step.
         let area_of_step = grid(20).area_of_step(middle)?;
