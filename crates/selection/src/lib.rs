@@ -20,6 +20,7 @@ mod hull;
 mod memory;
 mod mesh_of_points;
 mod near_points;
+mod outline;
 mod regions;
 mod rounds;
 mod sample;

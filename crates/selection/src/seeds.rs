@@ -1,6 +1,8 @@
-//! What the first round triangulates: the corners of the hull of all points, and of each cell of a square grid the point nearest to its middle.
+//! What the first round triangulates: the corners of the hull of all points, of each cell of a square grid the point nearest to its middle, and
+//! points along the outline.
 
 use crate::hull::hull_corners;
+use crate::outline::Outline;
 use delaunay::geometry::Bounds;
 use std::collections::HashMap;
 
@@ -34,6 +36,11 @@ impl LatticeCells {
         [(x + self.offset[0]) >> self.shift, (y + self.offset[1]) >> self.shift]
     }
 
+    /// Returns the middle of the cell in a column and a row.
+    pub(crate) fn middle(self, cell: [i32; 2]) -> [i64; 2] {
+        [0, 1].map(|axis| (i64::from(cell[axis]) << self.shift) - i64::from(self.offset[axis]) + self.side() / 2)
+    }
+
     /// Returns the side of a cell.
     pub(crate) fn side(self) -> i64 {
         1 << self.shift
@@ -59,6 +66,7 @@ pub(crate) struct Seeds {
     cells: LatticeCells,
     hull: Vec<[i32; 3]>,
     by_cell: HashMap<[i32; 2], [i32; 3]>,
+    outline: Outline,
     fixed: Vec<[i32; 3]>,
 }
 
@@ -66,7 +74,8 @@ impl Seeds {
     /// Returns no seeds for `points` points in `bounds`, on a lattice with this `offset`.
     pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2]) -> Seeds {
         let cells = LatticeCells::new(bounds, points, POINTS_PER_CELL, offset);
-        Seeds { cells, hull: Vec::new(), by_cell: HashMap::new(), fixed: Vec::new() }
+        let outline = Outline::none(bounds, points, offset);
+        Seeds { cells, hull: Vec::new(), by_cell: HashMap::new(), outline, fixed: Vec::new() }
     }
 
     /// Adds the points of a block, of which those that are `fixed` are seeds in any case.
@@ -78,6 +87,7 @@ impl Seeds {
             points.iter().copied().min_by_key(|&p| cells.rank(p)).into_iter().for_each(|point| self.offer(point));
         }
         self.hull = hull_corners(points.iter().chain(&self.hull).copied().collect());
+        self.outline.add(points);
         self.fixed.extend(fixed);
     }
 
@@ -91,6 +101,7 @@ impl Seeds {
     pub(crate) fn join(mut self, other: Seeds) -> Seeds {
         other.by_cell.into_values().for_each(|point| self.offer(point));
         self.hull = hull_corners([self.hull, other.hull].concat());
+        self.outline.join(other.outline);
         self.fixed.extend(other.fixed);
         self
     }
@@ -102,7 +113,9 @@ impl Seeds {
 
     /// Returns all seeds once, in order.
     pub(crate) fn into_points(self) -> Vec<[i32; 3]> {
-        let mut all: Vec<[i32; 3]> = self.by_cell.into_values().chain(self.hull).chain(self.fixed).collect();
+        let outline = self.outline.points(&self.hull);
+        let mut all: Vec<[i32; 3]> =
+            self.by_cell.into_values().chain(self.hull).chain(outline).chain(self.fixed).collect();
         all.sort_unstable();
         all.dedup();
         all

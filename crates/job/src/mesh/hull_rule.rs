@@ -32,10 +32,8 @@ const SPACINGS_OF_SELECTED: u64 = 50;
 const SHARE_OF_AREA: u64 = 16;
 /// ... and one of so many that its longest side would have, as a thin triangle over a bay has a few at its ends ...
 const SHARE_OF_SIDE: u64 = 8;
-/// ... and if one of so many of its cells holds a point: a triangle between two strips of ground may hold many, all of them along its border ...
-const SHARE_OF_CELLS: u64 = 4;
-/// ... or, where it holds few, if no more than so many share a cell on average.
-const POINTS_PER_CELL: u64 = 2;
+/// ... and if more than a third of its cells hold a point: a triangle between two strips of ground may hold many, all of them along its border.
+const LEAST_CELLS: u32 = HeldPoints::CELLS / 3 + 1;
 
 /// The rule of a job.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -125,8 +123,7 @@ impl HullRule {
             points * u128::from(self.limit)
                 >= u128::from(size) * u128::from(SPACINGS_OF_SELECTED * SPACINGS_OF_SELECTED)
         };
-        let cells = (u64::from(HeldPoints::CELLS) / SHARE_OF_CELLS).min(count / POINTS_PER_CELL);
-        u64::from(held.occupied()) >= cells
+        held.occupied() >= LEAST_CELLS
             && is_enough(u128::from(count * SHARE_OF_AREA), area)
             && is_enough(u128::from(count * SHARE_OF_SIDE).pow(2), longest)
     }

@@ -1,0 +1,140 @@
+//! Points along the outline of a cloud, where it bends inwards or around a hole.
+//!
+//! Without them, few vertices are left along a bay of flat ground, and triangles over it are as large as it is. Whoever looks for slivers along the hull
+//! takes such triangles for ground.
+
+use crate::seeds::LatticeCells;
+use delaunay::geometry::predicates::orient2d;
+use delaunay::geometry::{Bounds, Site};
+use std::collections::HashMap;
+
+/// A cell has so many points on average, or up to four times as many. So points along the outline are some 25 to 50 spacings apart.
+const POINTS_PER_CELL: u64 = 512;
+
+/// The cells beside one in the west, the east, the south and the north.
+const BESIDE: [[i32; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
+
+/// The outermost points of a cell towards those beside it.
+type Outermost = [[i32; 3]; 4];
+
+/// The cells with points.
+#[derive(Clone, Debug)]
+pub(crate) struct Outline {
+    cells: LatticeCells,
+    bounds: Bounds<2>,
+    known: HashMap<[i32; 2], Outermost>,
+}
+
+impl Outline {
+    /// Returns the outline without points, of `points` points in `bounds` on a lattice with this `offset`.
+    pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2]) -> Outline {
+        Outline { cells: LatticeCells::new(bounds, points, POINTS_PER_CELL, offset), bounds, known: HashMap::new() }
+    }
+
+    /// Adds points.
+    pub(crate) fn add(&mut self, points: &[[i32; 3]]) {
+        let cells = self.cells;
+        let cell = |[x, y, _]: [i32; 3]| cells.of(x, y);
+        // Neighbours one after the other mostly lie in one cell.
+        for points in points.chunk_by(|a, b| cell(*a) == cell(*b)) {
+            let one = |point: &[i32; 3]| [*point; 4];
+            points
+                .iter()
+                .map(one)
+                .reduce(outer)
+                .into_iter()
+                .for_each(|outermost| self.offer(cell(points[0]), outermost));
+        }
+    }
+
+    fn offer(&mut self, cell: [i32; 2], outermost: Outermost) {
+        let known = self.known.entry(cell).or_insert(outermost);
+        *known = outer(*known, outermost);
+    }
+
+    /// Adds the points of another one.
+    pub(crate) fn join(&mut self, other: Outline) {
+        other.known.into_iter().for_each(|(cell, outermost)| self.offer(cell, outermost));
+    }
+
+    /// Returns of each cell the outermost point towards each cell without points beside it whose middle lies in the `hull`.
+    pub(crate) fn points(&self, hull: &[[i32; 3]]) -> Vec<[i32; 3]> {
+        let hull: Vec<Site> = hull.iter().map(|[x, y, _]| [*x, *y]).collect();
+        let mut points = Vec::new();
+        for (cell, outermost) in &self.known {
+            for (beside, point) in BESIDE.iter().zip(outermost) {
+                let beside = [cell[0] + beside[0], cell[1] + beside[1]];
+                if !self.known.contains_key(&beside) && self.is_in_hull(beside, &hull) {
+                    points.push(*point);
+                }
+            }
+        }
+        points
+    }
+
+    fn is_in_hull(&self, cell: [i32; 2], hull: &[Site]) -> bool {
+        let Bounds { min, max } = self.bounds;
+        let [x, y] = self.cells.middle(cell);
+        let is_within = |value: i64, axis: usize| (i64::from(min[axis])..=i64::from(max[axis])).contains(&value);
+        if hull.len() < 3 || !is_within(x, 0) || !is_within(y, 1) {
+            return false;
+        }
+        let middle = [x as i32, y as i32];
+        (0..hull.len()).all(|k| orient2d(hull[k], hull[(k + 1) % hull.len()], middle) > 0)
+    }
+}
+
+/// Returns the outermost points of two cells that are one.
+fn outer(a: Outermost, b: Outermost) -> Outermost {
+    let inwards = |side: usize, [x, y, _]: [i32; 3]| [x, -x, y, -y][side];
+    [0, 1, 2, 3].map(|side| std::cmp::min_by_key(a[side], b[side], |point| (inwards(side, *point), *point)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hull::hull_corners;
+
+    /// Points one step apart in an L whose arms are `width` wide and 256 long.
+    fn arms(width: i32) -> Vec<[i32; 3]> {
+        let all = (0..256).flat_map(|y| (0..256).map(move |x| [x, y, 7]));
+        all.filter(|[x, y, _]| *x < width || *y < width).collect()
+    }
+
+    fn outline(blocks: &[&[[i32; 3]]]) -> Vec<[i32; 3]> {
+        let all = blocks.concat();
+        let bounds = Bounds::of_points(all.iter().map(|[x, y, _]| [*x, *y])).unwrap();
+        let mut outline = Outline::none(bounds, all.len() as u64, [0; 2]);
+        for block in blocks {
+            let mut of_block = Outline::none(bounds, all.len() as u64, [0; 2]);
+            of_block.add(block);
+            outline.join(of_block);
+        }
+        let mut points = outline.points(&hull_corners(all));
+        points.sort_unstable();
+        points
+    }
+
+    #[test]
+    fn a_bay_has_points_along_it() {
+        // 31,744 points on 65,536 steps: 1,024 are 2,114 steps, so a cell is 64 wide.
+        let points = arms(70);
+        let found = outline(&[&points]);
+        // The second cell of each arm is its last with points, but for where the other arm is.
+        assert!(found.iter().all(|&[x, y, _]| x == 69 && y >= 128 || y == 69 && x >= 128), "{found:?}");
+        assert!(found.iter().any(|p| p[0] == 69) && found.iter().any(|p| p[1] == 69), "{found:?}");
+    }
+
+    #[test]
+    fn what_is_convex_has_none() {
+        assert_eq!(outline(&[&arms(256)]), [[0; 3]; 0]);
+    }
+
+    #[test]
+    fn the_outline_is_that_of_all_blocks() {
+        let points = arms(90);
+        let (first, second) = points.split_at(points.len() / 3);
+        assert_eq!(outline(&[&points]), outline(&[second, first]));
+        assert!(!outline(&[&points]).is_empty());
+    }
+}
