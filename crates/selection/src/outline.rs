@@ -1,4 +1,4 @@
-//! Points along the outline of a cloud, where it bends inwards or around a hole.
+//! Points along the outline of a cloud, where it bends inwards.
 //!
 //! Without them, few vertices are left along a bay of flat ground, and triangles over it are as large as it is. Whoever looks for slivers along the hull
 //! takes such triangles for ground.
@@ -6,13 +6,10 @@
 use crate::seeds::LatticeCells;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// A cell has so many points on average, or up to four times as many. So points along the outline are some 25 to 50 spacings apart.
 const POINTS_PER_CELL: u64 = 512;
-
-/// The cells beside one in the west, the east, the south and the north.
-const BESIDE: [[i32; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
 
 /// The outermost points of a cell towards those beside it.
 type Outermost = [[i32; 3]; 4];
@@ -57,19 +54,33 @@ impl Outline {
         other.known.into_iter().for_each(|(cell, outermost)| self.offer(cell, outermost));
     }
 
-    /// Returns of each cell the outermost point towards each cell without points beside it whose middle lies in the `hull`.
+    /// Returns of each cell the outermost point towards each cell beside it that is outside, in a bay at least two cells wide, and whose middle
+    /// lies in the `hull`. Narrower bays stay as they are.
     pub(crate) fn points(&self, hull: &[[i32; 3]]) -> Vec<[i32; 3]> {
         let hull: Vec<Site> = hull.iter().map(|[x, y, _]| [*x, *y]).collect();
-        let mut points = Vec::new();
+        let (outside, mut points) = (wide(&self.outside()), Vec::new());
         for (cell, outermost) in &self.known {
-            for (beside, point) in BESIDE.iter().zip(outermost) {
-                let beside = [cell[0] + beside[0], cell[1] + beside[1]];
-                if !self.known.contains_key(&beside) && self.is_in_hull(beside, &hull) {
-                    points.push(*point);
+            let towards_outside = beside(*cell).zip(outermost);
+            let wanted = towards_outside.filter(|(cell, _)| outside.contains(cell) && self.is_in_hull(*cell, &hull));
+            points.extend(wanted.map(|(_, point)| *point));
+        }
+        points
+    }
+
+    /// Returns the cells without points that one comes to from the border of the box, and those around it.
+    fn outside(&self) -> HashSet<[i32; 2]> {
+        let [first, last] = [self.bounds.min, self.bounds.max].map(|[x, y]| self.cells.of(x, y));
+        let is_near = |cell: &[i32; 2]| (0..2).all(|axis| (first[axis] - 1..=last[axis] + 1).contains(&cell[axis]));
+        let corner = [first[0] - 1, first[1] - 1];
+        let (mut outside, mut next) = (HashSet::from([corner]), vec![corner]);
+        while let Some(cell) = next.pop() {
+            for cell in beside(cell).filter(is_near) {
+                if !self.known.contains_key(&cell) && outside.insert(cell) {
+                    next.push(cell);
                 }
             }
         }
-        points
+        outside
     }
 
     fn is_in_hull(&self, cell: [i32; 2], hull: &[Site]) -> bool {
@@ -82,6 +93,19 @@ impl Outline {
         let middle = [x as i32, y as i32];
         (0..hull.len()).all(|k| orient2d(hull[k], hull[(k + 1) % hull.len()], middle) > 0)
     }
+}
+
+/// Returns the cells that are in a square of four of them.
+fn wide(cells: &HashSet<[i32; 2]>) -> HashSet<[i32; 2]> {
+    let square = |[column, row]: [i32; 2]| [0, 1, 2, 3].map(|corner| [column + corner % 2, row + corner / 2]);
+    let squares =
+        cells.iter().map(|cell| square(*cell)).filter(|square| square.iter().all(|cell| cells.contains(cell)));
+    squares.flatten().collect()
+}
+
+/// Returns the cells beside one in the west, the east, the south and the north.
+fn beside([column, row]: [i32; 2]) -> impl Iterator<Item = [i32; 2]> {
+    [[-1, 0], [1, 0], [0, -1], [0, 1]].into_iter().map(move |[east, north]| [column + east, row + north])
 }
 
 /// Returns the outermost points of two cells that are one.
@@ -126,8 +150,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_convex_has_none() {
-        assert_eq!(outline(&[&arms(256)]), [[0; 3]; 0]);
+    fn what_is_convex_has_none_and_a_lake_neither() {
+        let mut points = arms(256);
+        assert_eq!(outline(&[&points]), [[0; 3]; 0]);
+        points.retain(|[x, y, _]| !(64..192).contains(x) || !(64..192).contains(y));
+        assert_eq!(outline(&[&points]), [[0; 3]; 0]);
+        // A bay, once it is open.
+        points.retain(|[x, y, _]| !(64..192).contains(x) || *y < 192);
+        assert!(outline(&[&points]).contains(&[64, 63, 7]));
     }
 
     #[test]
