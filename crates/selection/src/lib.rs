@@ -17,6 +17,7 @@ mod disc;
 mod error_bound;
 mod held_points;
 mod hull;
+mod lattice_cells;
 mod memory;
 mod mesh_of_points;
 mod near_points;

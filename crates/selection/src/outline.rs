@@ -3,7 +3,7 @@
 //! Without them, few vertices are left along a bay of flat ground, and triangles over it are as large as it is. Whoever looks for slivers along the hull
 //! takes such triangles for ground.
 
-use crate::seeds::LatticeCells;
+use crate::lattice_cells::LatticeCells;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
 use std::collections::{HashMap, HashSet};
@@ -25,7 +25,16 @@ pub(crate) struct Outline {
 impl Outline {
     /// Returns the outline without points, of `points` points in `bounds` on a lattice with this `offset`.
     pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2]) -> Outline {
-        Outline { cells: LatticeCells::new(bounds, points, POINTS_PER_CELL, offset), bounds, known: HashMap::new() }
+        let longest = bounds.extent(0).max(bounds.extent(1));
+        let cells = |wanted: u64| LatticeCells::new(bounds, points, wanted, offset);
+        // Along a line there are no more cells than in a square.
+        let is_wide = |cells: &LatticeCells| {
+            let side = u128::from(cells.side().unsigned_abs());
+            side * u128::from(points) >= u128::from(longest.unsigned_abs()) * u128::from(POINTS_PER_CELL)
+        };
+        let doubled = (0..30).map(|times| cells(POINTS_PER_CELL << times)).find(is_wide);
+        let cells = doubled.unwrap_or_else(|| cells(u64::MAX));
+        Outline { cells, bounds, known: HashMap::new() }
     }
 
     /// Adds points.
@@ -158,6 +167,15 @@ mod tests {
         // A bay, once it is open.
         points.retain(|[x, y, _]| !(64..192).contains(x) || *y < 192);
         assert!(outline(&[&points]).contains(&[64, 63, 7]));
+    }
+
+    #[test]
+    fn along_a_line_there_are_few_cells() {
+        let points: Vec<[i32; 3]> = (0..10_000).map(|i| [i * 50_000, i % 2, 0]).collect();
+        let bounds = Bounds::of_points(points.iter().map(|[x, y, _]| [*x, *y])).unwrap();
+        let mut outline = Outline::none(bounds, points.len() as u64, [0; 2]);
+        outline.add(&points);
+        assert!(outline.known.len() <= 20 && outline.outside().len() <= 60);
     }
 
     #[test]

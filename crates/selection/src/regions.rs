@@ -5,9 +5,9 @@
 //!
 //! Regions are cells of the lattice, and how large they are depends on the number of the points and their box alone. So does the result.
 
+use crate::lattice_cells::LatticeCells;
 use crate::memory::BlockMemory;
 use crate::rounds::BlockState;
-use crate::seeds::LatticeCells;
 use crate::source::{BlockPoints, PointSource, SelectionStore};
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;

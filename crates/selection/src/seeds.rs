@@ -2,6 +2,7 @@
 //! points along the outline.
 
 use crate::hull::hull_corners;
+use crate::lattice_cells::LatticeCells;
 use crate::outline::Outline;
 use delaunay::geometry::Bounds;
 use std::collections::HashMap;
@@ -9,56 +10,6 @@ use std::collections::HashMap;
 /// A cell has so many points, more or less. With fewer, seeds are a burden where few points are wanted in the end; with more, the first rounds
 /// take longer.
 const POINTS_PER_CELL: u64 = 16_000;
-
-/// Square cells whose sides are a power of two steps, and which have so many points on average. They begin at zero of the source coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct LatticeCells {
-    shift: u32,
-    /// The steps in x and y from there to zero of the lattice, less a multiple of the widest cells.
-    offset: [i32; 2],
-}
-
-/// The cells are no wider than two to the power of this many steps, the widest extent of a lattice.
-const MOST_SHIFT: u32 = 30;
-
-impl LatticeCells {
-    /// Returns the smallest cells that hold `wanted` of the `points` in `bounds` on average, on a lattice with this `offset`: see
-    /// [`crate::PointSource::offset`].
-    pub(crate) fn new(bounds: Bounds<2>, points: u64, wanted: u64, offset: [i64; 2]) -> LatticeCells {
-        let area = (bounds.extent(0) + 1) as u128 * (bounds.extent(1) + 1) as u128;
-        let is_enough = |shift: &u32| u128::from(points) << (2 * shift) >= u128::from(wanted) * area;
-        let shift = (0..MOST_SHIFT).find(is_enough).unwrap_or(MOST_SHIFT);
-        LatticeCells { shift, offset: offset.map(|offset| offset.rem_euclid(1 << MOST_SHIFT) as i32) }
-    }
-
-    /// Returns the column and the row of the cell that `x` and `y` are in.
-    pub(crate) fn of(self, x: i32, y: i32) -> [i32; 2] {
-        [(x + self.offset[0]) >> self.shift, (y + self.offset[1]) >> self.shift]
-    }
-
-    /// Returns the middle of the cell in a column and a row.
-    pub(crate) fn middle(self, cell: [i32; 2]) -> [i64; 2] {
-        [0, 1].map(|axis| (i64::from(cell[axis]) << self.shift) - i64::from(self.offset[axis]) + self.side() / 2)
-    }
-
-    /// Returns the side of a cell.
-    pub(crate) fn side(self) -> i64 {
-        1 << self.shift
-    }
-
-    /// Returns cells of a quarter of the side, or of one step, and how many of them lie along a side of these; `None` if these cells are one step
-    /// wide.
-    pub(crate) fn finer(self) -> Option<(LatticeCells, i32)> {
-        let shift = self.shift.saturating_sub(2);
-        (shift < self.shift).then(|| (LatticeCells { shift, ..self }, 1 << (self.shift - shift)))
-    }
-
-    /// Returns by what points of a cell are compared: the square of the distance from its middle, and the point.
-    fn rank(self, point: [i32; 3]) -> (i64, [i32; 3]) {
-        let along = |axis: usize| i64::from(point[axis] + self.offset[axis]).rem_euclid(self.side()) - self.side() / 2;
-        (along(0).pow(2) + along(1).pow(2), point)
-    }
-}
 
 /// Seeds of a block, or of several.
 #[derive(Clone, Debug)]

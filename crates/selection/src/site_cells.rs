@@ -1,7 +1,7 @@
 //! Selected points in memory, by the cell of a grid that they lie in. A cell with many has a grid of its own.
 
 use crate::area::Area;
-use crate::seeds::LatticeCells;
+use crate::lattice_cells::LatticeCells;
 use crate::source::BYTES_PER_LISTED;
 use delaunay::geometry::Bounds;
 use std::ops::{ControlFlow, Range};
