@@ -42,7 +42,7 @@ fn smallest(range: i64, farthest: i64) -> i64 {
 
 /// Returns the multiple of `step`, a power of two, nearest to a height.
 fn nearest(height: i64, step: i64) -> i64 {
-    // A division takes ten times as long.
+    // By shifts: a division takes ten times as long.
     let bits = step.trailing_zeros();
     (2 * height + step) >> (bits + 1) << bits
 }
@@ -61,8 +61,10 @@ pub struct Surface<'a> {
     pub water: Option<&'a Water>,
 }
 
-/// The bytes of a vertex and its two triangles, and those of a usual tile besides: room for most tiles.
+/// The bytes of a vertex and its two triangles.
 const BYTES_PER_VERTEX: usize = 20;
+
+/// The bytes that most tiles have besides.
 const BYTES_BESIDE: usize = 4096;
 
 /// The number of the extension with normals.

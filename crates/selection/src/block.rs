@@ -372,7 +372,7 @@ impl Block {
     }
 
     /// Returns the distances of all points that are not selected.
-    /// Also lists the triangles with some inside, of those that it `asks_about`.
+    /// Also lists the triangles that hold points, of those for which `asks_about` is true.
     pub(crate) fn errors(&self, asks_about: impl Fn([Site; 3]) -> bool) -> BlockErrors {
         let mut errors = BlockErrors::default();
         for triangle in 0..self.mesh.held.len() {

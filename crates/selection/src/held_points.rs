@@ -4,7 +4,7 @@ use crate::mesh_of_points::TriangleKey;
 use delaunay::geometry::Site;
 use delaunay::geometry::predicates::orient2d;
 
-/// Each side of a triangle is cut into so many equal pieces, and the triangle into the square of it.
+/// Each side of a triangle is cut into so many equal pieces, and the triangle into the square of that number.
 const PIECES: i64 = 8;
 
 /// A triangle and the points inside it. Those on its sides are not among them: they are as much in the triangle beside it.
@@ -34,7 +34,7 @@ impl HeldPoints {
         held
     }
 
-    /// Adds a point that is inside.
+    /// Adds a point if it is inside.
     pub(crate) fn add(&mut self, point: Site) {
         let [a, b, c] = self.corners;
         let area = i128::from(orient2d(a, b, c));

@@ -1,4 +1,4 @@
-//! Cells of the lattice.
+//! A grid of square cells, which does not depend on where the lattice of a job begins.
 
 use delaunay::geometry::Bounds;
 

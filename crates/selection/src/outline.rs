@@ -1,24 +1,25 @@
 //! Points along the outline of a cloud, where it bends inwards.
 //!
-//! Without them, few vertices are left along a bay of flat ground, and triangles over it are as large as it is. Whoever looks for slivers along the hull
-//! takes such triangles for ground.
+//! Without them, few vertices are left along a bay of flat ground, and triangles over it are as large as it is. The rule for slivers along the hull would
+//! keep those.
 
 use crate::lattice_cells::LatticeCells;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
 use std::collections::{HashMap, HashSet};
 
-/// A cell has so many points on average, or up to four times as many. So points along the outline are some 25 to 50 spacings apart.
+/// A cell has so many points on average, or up to four times as many. So points along the outline are some 25 to 50 spacings of the box apart.
 const POINTS_PER_CELL: u64 = 512;
 
-/// The outermost points of a cell towards those beside it.
+/// The points of a cell that are farthest west, east, south and north.
 type Outermost = [[i32; 3]; 4];
 
-/// The cells with points.
+/// The outline of a cloud, or of a part of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Outline {
     cells: LatticeCells,
     bounds: Bounds<2>,
+    /// The cells with points.
     known: HashMap<[i32; 2], Outermost>,
 }
 
@@ -27,13 +28,13 @@ impl Outline {
     pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2]) -> Outline {
         let longest = bounds.extent(0).max(bounds.extent(1));
         let cells = |wanted: u64| LatticeCells::new(bounds, points, wanted, offset);
-        // Along a line there are no more cells than in a square.
-        let is_wide = |cells: &LatticeCells| {
+        // Points along a line have no more cells than the same number in a square.
+        let is_wide_enough = |cells: &LatticeCells| {
             let side = u128::from(cells.side().unsigned_abs());
             side * u128::from(points) >= u128::from(longest.unsigned_abs()) * u128::from(POINTS_PER_CELL)
         };
-        let doubled = (0..30).map(|times| cells(POINTS_PER_CELL << times)).find(is_wide);
-        let cells = doubled.unwrap_or_else(|| cells(u64::MAX));
+        let found = (0..30).map(|times| cells(POINTS_PER_CELL << times)).find(is_wide_enough);
+        let cells = found.unwrap_or_else(|| cells(u64::MAX));
         Outline { cells, bounds, known: HashMap::new() }
     }
 
@@ -43,13 +44,9 @@ impl Outline {
         let cell = |[x, y, _]: [i32; 3]| cells.of(x, y);
         // Neighbours one after the other mostly lie in one cell.
         for points in points.chunk_by(|a, b| cell(*a) == cell(*b)) {
-            let one = |point: &[i32; 3]| [*point; 4];
-            points
-                .iter()
-                .map(one)
-                .reduce(outer)
-                .into_iter()
-                .for_each(|outermost| self.offer(cell(points[0]), outermost));
+            if let Some(outermost) = points.iter().map(|point| [*point; 4]).reduce(outer) {
+                self.offer(cell(points[0]), outermost);
+            }
         }
     }
 
@@ -63,8 +60,8 @@ impl Outline {
         other.known.into_iter().for_each(|(cell, outermost)| self.offer(cell, outermost));
     }
 
-    /// Returns of each cell the outermost point towards each cell beside it that is outside, in a bay at least two cells wide, and whose middle
-    /// lies in the `hull`. Narrower bays stay as they are.
+    /// Returns for each cell and each cell of a bay beside it the point nearest to that. Bays are cells outside that are in a square of four such cells, with
+    /// their middles in the `hull`: narrower ones stay as they are.
     pub(crate) fn points(&self, hull: &[[i32; 3]]) -> Vec<[i32; 3]> {
         let hull: Vec<Site> = hull.iter().map(|[x, y, _]| [*x, *y]).collect();
         let (outside, mut points) = (wide(&self.outside()), Vec::new());

@@ -34,10 +34,10 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
     let points = blocks.iter().map(|state| state.points).sum();
     if points <= sizes.undivided {
         let seeds = seeds_of(source, &blocks, Seeds::none(bounds, points, source.offset()))?;
-        let outline = seeds.hull().to_vec();
+        let hull = seeds.hull().to_vec();
         let mut rounds = Rounds::new(source, blocks, bounds, memory);
         rounds.add(seeds.into_points())?;
-        return rounds.run(outline, 0, bound, Sample::ladder(source.offset()));
+        return rounds.run(hull, 0, bound, Sample::ladder(source.offset()));
     }
     let Division { blocks, regions } = divide(source, blocks, &memory, bounds, points, sizes)?;
     let mut rounds = Rounds::new(source, blocks, bounds, memory);

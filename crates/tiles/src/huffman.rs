@@ -55,7 +55,7 @@ fn add_block(writer: &mut BitWriter, block: &[u8], is_last: bool) {
 
 /// Returns how often each symbol occurs in a block.
 fn counts(block: &[u8]) -> [u32; END + 1] {
-    // Several lists, so that no byte waits for an equal one shortly before: of small numbers, every second byte is zero.
+    // Several lists, so that no byte waits for an equal one shortly before: of small numbers of two bytes, every second byte is zero.
     let mut lists = [[0u32; END + 1]; 8];
     let (eights, rest) = block.as_chunks::<8>();
     for eight in eights {

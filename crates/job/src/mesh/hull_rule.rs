@@ -32,7 +32,8 @@ const SPACINGS_OF_SELECTED: u64 = 35;
 const SHARE_OF_AREA: u64 = 16;
 /// ... and one of so many that its longest side would have, as a thin triangle over a bay has a few at its ends ...
 const SHARE_OF_SIDE: u64 = 8;
-/// ... and if more than a third of its cells hold a point: a triangle between two strips of ground may hold many, all of them along its border.
+/// ... and if more than a third of its cells hold a point: a triangle between two strips of ground may hold many, all of them along its border. So one
+/// with fewer points is on none.
 const LEAST_CELLS: u32 = HeldPoints::CELLS / 3 + 1;
 
 /// The rule of a job.

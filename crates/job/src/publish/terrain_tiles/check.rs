@@ -39,8 +39,8 @@ pub(crate) fn check_terrain(plan: &Plan) -> Result<()> {
     if highest > scheme.most_latitude() {
         return Err(beyond_latitudes(scheme, highest));
     }
-    let widest = longitudes.max(claimed(plan, &globe, |place| place.longitudes_from(&middle)));
-    if widest > MOST_LONGITUDES { Err(beyond_longitudes(widest)) } else { Ok(()) }
+    let widest = longitudes.max(claimed(plan, &globe, |place| place.span_around(&middle)));
+    if widest > MOST_LONGITUDES { Err(beyond_longitudes(Some(widest))) } else { Ok(()) }
 }
 
 /// Returns the greatest value of `measure` that a point has for sure by the boxes of the inputs: each has a point on each side.

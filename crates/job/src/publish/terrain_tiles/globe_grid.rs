@@ -14,7 +14,7 @@ use sys::{Error, Result};
 use tiles::frame::Extras;
 use tiles::tiles3d::globe::{Globe, NotPlaced};
 
-/// The sides of cells in a tile, at least.
+/// How many cells lie along a side of a tile, at least.
 const CELLS_PER_TILE: f64 = 4.0;
 
 /// The longest side of a cell in metres.
@@ -53,7 +53,7 @@ impl Place {
     }
 
     /// Returns how many degrees of longitude a terrain spans that reaches as far to both sides of its middle as to this place.
-    pub(super) fn longitudes_from(self, middle: &Place) -> f64 {
+    pub(super) fn span_around(self, middle: &Place) -> f64 {
         2.0 * (self.beside(middle.longitude).longitude - middle.longitude).to_degrees().abs()
     }
 }
@@ -129,7 +129,7 @@ impl<'a> GlobeGrid<'a> {
                 return Err(beyond_latitudes(self.scheme, place.latitude.to_degrees().abs()));
             }
             if (place.longitude - self.middle.longitude).abs() > most_longitude {
-                return Err(beyond_longitudes(place.longitudes_from(&self.middle)));
+                return Err(beyond_longitudes(None));
             }
             let height =
                 (self.extras.offset[2] + self.extras.resolution_z * f64::from(z)) * self.extras.metres_per_unit_z;

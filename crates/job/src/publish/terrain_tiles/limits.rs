@@ -20,11 +20,10 @@ pub(super) fn beyond_latitudes(scheme: Scheme, highest: f64) -> Error {
 /// The widest terrain in degrees of longitude.
 pub(super) const MOST_LONGITUDES: f64 = 90.0;
 
-/// Returns the error about a terrain that spans so many degrees of longitude.
-pub(super) fn beyond_longitudes(widest: f64) -> Error {
-    refused(&format!(
-        "the terrain spans about {widest:.0} degrees of longitude; {MOST_LONGITUDES} degrees is the limit"
-    ))
+/// Returns the error about a terrain that spans too many degrees of longitude: so many, if that is known.
+pub(super) fn beyond_longitudes(widest: Option<f64>) -> Error {
+    let widest = widest.map_or(format!("more than {MOST_LONGITUDES}"), |widest| format!("about {widest:.0}"));
+    refused(&format!("the terrain spans {widest} degrees of longitude; {MOST_LONGITUDES} degrees is the limit"))
 }
 
 /// Returns the error about a terrain that terrain tiles cannot have.

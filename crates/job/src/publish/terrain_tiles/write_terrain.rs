@@ -108,7 +108,7 @@ impl<'a> TerrainWork<'a> {
     /// Writes the tiles from those of the job, which must have their names. Calls `done` for each of the [steps](TerrainWork::steps).
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Input`] on a file, [`Error::Config`] if a place is not on the globe, [`Error::Interrupted`].
+    /// [`Error::Io`] or [`Error::Input`] on a file, [`Error::Config`] if a place is not on the globe or the terrain too wide, [`Error::Interrupted`].
     pub(crate) fn write(
         &self,
         directory: &JobDirectory,
