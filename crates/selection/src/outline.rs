@@ -60,8 +60,8 @@ impl Outline {
         other.known.into_iter().for_each(|(cell, outermost)| self.offer(cell, outermost));
     }
 
-    /// Returns for each cell and each cell of a bay beside it the point nearest to that. Bays are cells outside that are in a square of four such cells, with
-    /// their middles in the `hull`: narrower ones stay as they are.
+    /// Returns the points that are nearest to a bay, one for each side on which a cell with points meets it. A bay is made of cells outside whose middles lie
+    /// in the `hull`, and is at least two cells wide.
     pub(crate) fn points(&self, hull: &[[i32; 3]]) -> Vec<[i32; 3]> {
         let hull: Vec<Site> = hull.iter().map(|[x, y, _]| [*x, *y]).collect();
         let (outside, mut points) = (wide(&self.outside()), Vec::new());
@@ -73,7 +73,7 @@ impl Outline {
         points
     }
 
-    /// Returns the cells without points that one comes to from the border of the box, and those around it.
+    /// Returns the cells without points that are connected to the border of the box, and those just around the box.
     fn outside(&self) -> HashSet<[i32; 2]> {
         let [first, last] = [self.bounds.min, self.bounds.max].map(|[x, y]| self.cells.of(x, y));
         let is_near = |cell: &[i32; 2]| (0..2).all(|axis| (first[axis] - 1..=last[axis] + 1).contains(&cell[axis]));
@@ -101,7 +101,7 @@ impl Outline {
     }
 }
 
-/// Returns the cells that are in a square of four of them.
+/// Returns the cells that are part of a square of four such cells.
 fn wide(cells: &HashSet<[i32; 2]>) -> HashSet<[i32; 2]> {
     let square = |[column, row]: [i32; 2]| [0, 1, 2, 3].map(|corner| [column + corner % 2, row + corner / 2]);
     let squares =
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_bay_has_points_along_it() {
-        // 31,744 points on 65,536 steps: 1,024 are 2,114 steps, so a cell is 64 wide.
+        // 30,940 points on 65,025 steps: 512 have 1,076 of them, so a cell is 64 wide.
         let points = arms(70);
         let found = outline(&[&points]);
         // The second cell of each arm is its last with points, but for where the other arm is.
