@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn parts_stay_as_they_are_when_pages_are_removed() {
-        let bytes: Vec<u8> = (0..3 * MOST_RESIDENT as u32).map(|i| ((i * 7919) >> 8) as u8).collect();
+        let bytes: Vec<u8> = (0..3 * MOST_RESIDENT as u32).map(|i| (i.wrapping_mul(7919) >> 8) as u8).collect();
         let file = file_of(&bytes);
         let map = MappedFile::new(&file);
         let parts: Vec<_> = (0..12).map(|i| map.part(&file, i << 20, 1 << 20).unwrap()).collect();
