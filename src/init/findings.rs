@@ -5,8 +5,8 @@ use crs::{Crs, Unit};
 use job::plan::job_plan::Plan;
 use job::preflight::check::Preflight;
 use job::progress::number_text::{grouped, mebibytes};
+use points::Source;
 use points::surface_warnings::listed;
-use points::{FileFormat, Source};
 
 /// The most systems that a sentence names.
 const MOST_NAMED: usize = 3;
@@ -74,12 +74,7 @@ fn points(draft: &Draft, sources: &[&Source], preflight: &Preflight, plan: &Plan
 }
 
 fn format(source: &Source) -> String {
-    let name = match source.format {
-        FileFormat::Las => "LAS",
-        FileFormat::Laz => "LAZ",
-        FileFormat::Text => "text",
-        FileFormat::Ept => "EPT",
-    };
+    let name = source.format.name();
     source.version.map_or(name.into(), |[major, minor]| format!("{name} {major}.{minor}"))
 }
 

@@ -3,7 +3,7 @@
 use crate::init::draft::{Draft, NeededLine};
 use job::plan::job_plan::Plan;
 use job::preflight::check::{Preflight, inspect};
-use points::{FileFormat, is_url};
+use points::is_url;
 use std::path::Path;
 use sys::Result;
 
@@ -27,8 +27,7 @@ impl OfferedOptions {
         let shares = preflight.surface_sample;
         let has_ground = shares.ground > 0 && shares.ground < shares.points && !draft.sets("surface");
         // The rows of a text have to have a class that can be read. Other files have nothing else.
-        let is_text = |source: FileFormat| source == FileFormat::Text;
-        let has_text = plan.inputs.iter().any(|input| is_text(input.source.format));
+        let has_text = plan.inputs.iter().any(|input| input.source.format.is_text());
         let ground = has_ground && (!has_text || is_taken(draft, "surface", "ground", None)?);
         // The files have one system, so that one of them tells whether there is a way from it.
         let first = plan.inputs.iter().find(|input| input.source.own_crs().is_named()).map(|input| &*input.source.path);

@@ -3,7 +3,7 @@
 use crate::init::draft::{Draft, NeededLine};
 use crs::{Crs, Unit};
 use job::plan::inputs::input_paths;
-use points::{FileFormat, Source};
+use points::Source;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use sys::{Error, Result};
@@ -65,7 +65,7 @@ impl CrsAttempts {
         // The columns of a text may be exchanged, or a row of it may be a mistake. So may x and y of another file.
         let is_nowhere = |source: &Source| {
             let [x, y] = [0, 1].map(|axis| farthest(source, axis));
-            source.format != FileFormat::Text && (x > 360.0 || y > 90.0) && (x > 90.0 || y > 180.0)
+            !source.format.is_text() && (x > 360.0 || y > 90.0) && (x > 90.0 || y > 180.0)
         };
         let all_say_degrees = self.sources.iter().all(|source| source.crs.horizontal == Unit::Degree);
         // Degrees and pixels have no plane in common.

@@ -10,7 +10,9 @@ use crate::bad_files::write;
 use crate::breaklines::with_doubtful_heights;
 use crate::clip::clipped;
 use crate::clouds;
+use crate::copc_file::CopcFile;
 use crate::diff::surveys;
+use crate::ept_files::{EptFiles, NodeType};
 use crate::far_points::with_a_far_point;
 use crate::las_file::LasFile;
 use crate::levels::hills;
@@ -120,6 +122,9 @@ fn add_jobs_of_one_part(documents: &Documents) {
         &Job::on(&[server.url("/returns.las")])
             .with("input", "returns = [1, 2]\nclasses = [1, 2, 3]\nresolution = 0.01"),
     );
+    let octree = CopcFile::new(&LasFile::new(4, 7, 0, 500), 2);
+    let octree = EptFiles::of(&octree, NodeType::Binary).write(&folder.path().join("octree"));
+    documents.run(&Job::on(&[octree]));
 }
 
 fn add_what_is_missing_or_wrong(documents: &Documents, job: &Job) {

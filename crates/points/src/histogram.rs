@@ -11,7 +11,7 @@ use crate::points::classes;
 use crate::points::record::PointRecord;
 use crate::points::record_sink::RecordSink;
 use crate::points::returns::PulseReturn;
-use crate::source::{FileFormat, Source};
+use crate::source::Source;
 use crate::surface::SurfaceShares;
 use sys::Result;
 
@@ -51,7 +51,7 @@ impl Histogram {
         let none = RecordCounts::default;
         let _ahead = source.read_ahead(None, false)?;
         let counts = (0..source.chunks()).into_par_iter().map(count).try_reduce(none, |a, b| Ok(a.with(&b)))?;
-        let returns = if source.format == FileFormat::Text { &[] } else { &counts.returns[..] };
+        let returns = if source.format.is_text() { &[] } else { &counts.returns[..] };
         Ok(Histogram {
             classes: present(if source.has_class { &counts.classes } else { &[] }),
             returns: present(returns),

@@ -106,12 +106,7 @@ impl SourceDescription {
     }
 
     fn kind(&self) -> String {
-        let name = match self.format {
-            FileFormat::Las => "LAS",
-            FileFormat::Laz => "LAZ",
-            FileFormat::Text => "text",
-            FileFormat::Ept => "EPT",
-        };
+        let name = self.format.name();
         match (&self.version, self.point_format) {
             (Some(version), Some(format)) => format!("{name} {version}, point format {format}"),
             _ => name.to_string(),

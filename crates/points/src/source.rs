@@ -59,6 +59,26 @@ pub enum FileFormat {
     Ept,
 }
 
+impl FileFormat {
+    /// Returns its name for readers.
+    pub fn name(self) -> &'static str {
+        match self {
+            FileFormat::Las => "LAS",
+            FileFormat::Laz => "LAZ",
+            FileFormat::Text => "text",
+            FileFormat::Ept => "EPT",
+        }
+    }
+
+    /// Tells whether it has no header: bounds, classes and returns are known from the columns and the rows alone.
+    pub fn is_text(self) -> bool {
+        match self {
+            FileFormat::Text => true,
+            FileFormat::Las | FileFormat::Laz | FileFormat::Ept => false,
+        }
+    }
+}
+
 /// A point cloud file that has been opened. What it says about its points is a claim of the file; only [`Source::decode`] tells
 /// the truth.
 ///
@@ -393,7 +413,7 @@ impl Source {
     /// Returns the raw integers within these bounds in x and y: least x and y, greatest x and y, borders included. `None` for text, which
     /// compares the numbers that it holds, unless the job transforms them.
     pub fn raw_bounds(&self, bounds: [f64; 4]) -> Option<RawBounds> {
-        let compares_itself = self.format == FileFormat::Text && self.transform.is_none();
+        let compares_itself = self.format.is_text() && self.transform.is_none();
         (!compares_itself).then(|| RawBounds::of(&self.axes, bounds))
     }
 

@@ -2,7 +2,7 @@
 
 use crate::middle_zone::zone_of_middle;
 use crate::options::{InputOptions, UnitChoice};
-use crate::source::{FileFormat, Source};
+use crate::source::Source;
 use crate::source_transform::SourceTransform;
 use crate::stated_crs::{no_way, stated_crs, stated_or_missing};
 use crate::transform_warnings::{
@@ -133,7 +133,7 @@ fn transform(source: &mut Source, from: Crs, to: &Crs, options: &InputOptions) -
 /// looked at, so its box is no mere claim.
 fn refuse_impossible_latitudes(sources: &[Source], said: &[Crs]) -> Result<()> {
     let is_impossible = |source: &Source, crs: &Crs| {
-        let is_of_degrees = source.format == FileFormat::Text && source.records > 0 && crs.kind == CrsKind::Geographic;
+        let is_of_degrees = source.format.is_text() && source.records > 0 && crs.kind == CrsKind::Geographic;
         let ends = [source.min[1], source.max[1]];
         let has_place = |way: &CrsTransform| ends.iter().any(|latitude| way.apply([0.0, *latitude]).is_some());
         let is_one_side = ends[0].signum() == ends[1].signum();

@@ -163,7 +163,7 @@ impl Change {
 
     /// Says what to do about a file of this format.
     pub(crate) fn cure(&self, format: FileFormat) -> String {
-        let is_text = format == FileFormat::Text;
+        let is_text = format.is_text();
         match self {
             Change::Degrees { exchanged } => degrees(*exchanged, is_text),
             Change::Exchanged => format!("with x and y exchanged, they lie within it: {}", exchange(is_text)),

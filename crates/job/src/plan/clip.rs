@@ -7,11 +7,11 @@
 use crate::options::JobOptions;
 use crate::plan::extent::{MEASURE, measure, to_float};
 use lattice::{Lattice, LatticeArea, Polygons};
+use points::Source;
 use points::lines::line_crs::{SystemOfPoints, bring_to_points};
 use points::lines::options::LineOptions;
 use points::lines::{LineFile, LineShape, read_lines};
 use points::options::InputOptions;
-use points::{FileFormat, Source};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
@@ -191,7 +191,7 @@ fn is_outside(source: &Source, [xmin, ymin, xmax, ymax]: [f64; 4]) -> bool {
 
 /// Returns the rectangle that a header claims, and a little around it; `None` for a text.
 fn claimed(source: &Source) -> Option<[[f64; 2]; 2]> {
-    let [min, max] = source.claimed_rectangle().filter(|_| source.format != FileFormat::Text)?;
+    let [min, max] = source.claimed_rectangle().filter(|_| !source.format.is_text())?;
     let slack =
         |axis: usize| SLACK * (max[axis] - min[axis]) + 2.0 * MEASURE as f64 * to_float(source.axes[axis].scale);
     Some([[min[0] - slack(0), min[1] - slack(1)], [max[0] + slack(0), max[1] + slack(1)]])

@@ -2,8 +2,8 @@
 
 use crate::plan::distinct_crs::DistinctCrs;
 use crs::{ComparableCrs, Crs, CrsChoice, Unit, same_length};
+use points::Source;
 use points::options::UnitChoice;
-use points::{FileFormat, Source};
 use std::borrow::Cow;
 use sys::{Error, Result, Warnings, of_inputs};
 
@@ -20,7 +20,7 @@ impl StatedCrs<'_> {
     /// `[input] unit` says what the columns of a text are in: x and y, and heights in the same unit.
     fn of(source: &Source, unit: UnitChoice) -> StatedCrs<'_> {
         let (chosen, named) = (unit.unit(), source.crs.horizontal.metres_per_unit());
-        if source.format != FileFormat::Text || chosen == Unit::Unknown {
+        if !source.format.is_text() || chosen == Unit::Unknown {
             return StatedCrs { source, crs: Cow::Borrowed(&source.crs) };
         }
         let is_followed = |z: f64| Some(z) == named || are_feet(Unit::from_metres(Some(z)), chosen);
@@ -29,7 +29,7 @@ impl StatedCrs<'_> {
     }
 
     fn is_text(&self) -> bool {
-        self.source.format == FileFormat::Text
+        self.source.format.is_text()
     }
 }
 
@@ -269,7 +269,7 @@ fn warn_of_depths(said: &[StatedCrs], crs: &Crs, warnings: &mut Warnings) {
 fn warn_of_other_units(sources: &[Source], choice: &CrsChoice, chosen: Unit, warnings: &mut Warnings) {
     let is_other = |source: &&Source| {
         let own = source.crs.horizontal;
-        let is_text = source.format == FileFormat::Text;
+        let is_text = source.format.is_text();
         let lengths = own.metres_per_unit().zip(chosen.metres_per_unit());
         // What a choice of no CRS leaves aside is named elsewhere.
         (is_text || *choice != CrsChoice::None && !source.crs.is_named())
@@ -282,7 +282,7 @@ fn warn_of_other_units(sources: &[Source], choice: &CrsChoice, chosen: Unit, war
             "{}[input] unit ({}) overrides the unit of its {} ({})",
             of_inputs(others.len(), sources.len(), &first.path),
             chosen.name(),
-            if first.format == FileFormat::Text { "columns" } else { "records" },
+            if first.format.is_text() { "columns" } else { "records" },
             first.crs.horizontal.name()
         ));
     }

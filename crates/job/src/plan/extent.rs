@@ -3,7 +3,7 @@
 use delaunay::geometry::Bounds;
 use lattice::AxisMap;
 use points::options::InputOptions;
-use points::{Axis, FileFormat, OptionalFields, PointRules, Source};
+use points::{Axis, OptionalFields, PointRules, Source};
 use rayon::prelude::*;
 use rust_decimal::Decimal;
 use rust_decimal::prelude::ToPrimitive;
@@ -86,7 +86,7 @@ impl Extent {
 /// Returns the box of a source by its header, or by its points if the first of them show that the header is wrong.
 fn header_box(source: &Source, options: &InputOptions) -> Result<Option<SourceBox>> {
     // Every row of a text has been looked at.
-    if source.format == FileFormat::Text || source.measured().is_some() {
+    if source.format.is_text() || source.measured().is_some() {
         return Ok(source.wanted_box());
     }
     let header = [source.min, source.max];
@@ -119,7 +119,7 @@ pub(crate) fn measure(
     chunks: Range<usize>,
     records: u64,
 ) -> Result<Option<SourceBox>> {
-    if source.format == FileFormat::Text || source.measured().is_some() {
+    if source.format.is_text() || source.measured().is_some() {
         return Ok(source.wanted_box());
     }
     let Some(rules) = measuring_rules(source, options, [MEASURE; 3]) else {

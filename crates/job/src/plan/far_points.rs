@@ -151,10 +151,10 @@ fn explain(sources: &mut [Source], rest: &Extent) {
                 format!("[input] heights = [{low}, {high}] or ")
             }
         };
-        let points = if source.format == FileFormat::Text { "rows" } else { "points" };
+        let points = if source.format.is_text() { "rows" } else { "points" };
         // The message shows a row as the file has it.
         let place = match source.transformed_from() {
-            Some(_) if source.format == FileFormat::Text => format!("in {}, ", source.crs.label()),
+            Some(_) if source.format.is_text() => format!("in {}, ", source.crs.label()),
             _ => String::new(),
         };
         source.set_remedy(&format!(

@@ -4,7 +4,7 @@ use crate::plan::extent::Extent;
 use crate::plan::height_range::HeightSample;
 use crate::plan::suspect_heights::own_height;
 use lattice::Lattice;
-use points::{FileFormat, Source};
+use points::Source;
 
 /// Fewer points may be a plate.
 const FEWEST: usize = 10;
@@ -24,7 +24,7 @@ pub(crate) fn flat_points(
         false => return None,
     };
     let height = own_height(sources.first()?, lattice, steps.into());
-    let is_text = sources.iter().any(|source| source.format == FileFormat::Text);
+    let is_text = sources.iter().any(|source| source.format.is_text());
     let column = if is_text { "[input.csv] columns for the column of heights, or " } else { "" };
     Some(format!(
         "{points} have the height {height}, so the terrain is flat; fix: if the {} has no heights, {column}{} with heights",

@@ -2,8 +2,8 @@
 
 use crate::plan::common_crs::TRANSFORM;
 use crs::{Crs, CrsChoice, CrsKind};
+use points::Source;
 use points::options::InputOptions;
-use points::{FileFormat, Source};
 use sys::{Error, Result, Warnings, of_inputs};
 
 /// Checks that no source is in a geocentric system, as its record or the user states.
@@ -86,9 +86,8 @@ pub(crate) fn warn_of_degrees(sources: &[Source], options: &InputOptions, warnin
     if options.crs != CrsChoice::Auto || options.missing_crs.is_some() {
         return;
     }
-    let is_meant = |source: &&Source| {
-        source.format != FileFormat::Text && !source.own_crs().is_named() && source.looks_like_degrees()
-    };
+    let is_meant =
+        |source: &&Source| !source.format.is_text() && !source.own_crs().is_named() && source.looks_like_degrees();
     let found: Vec<&Source> = sources.iter().filter(is_meant).collect();
     if let Some(first) = found.first() {
         warnings.push(format!(

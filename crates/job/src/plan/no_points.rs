@@ -6,7 +6,7 @@ use crate::plan::job_plan::Plan;
 use crate::plan::job_plan::decoded_records;
 use crate::plan::text_inputs::count;
 use points::surface_warnings::no_ground;
-use points::{FileFormat, PointCounts, Source};
+use points::{PointCounts, Source};
 use sys::Result;
 
 /// A rectangle [xmin, ymin, xmax, ymax] in source units.
@@ -93,7 +93,7 @@ fn box_of_inputs(plan: &Plan) -> Option<Rectangle> {
 
 /// Returns whether the rectangle of all inputs is what headers say. Of texts it is that of their rows.
 fn are_from_headers(plan: &Plan) -> bool {
-    plan.inputs.iter().any(|input| input.source.format != FileFormat::Text)
+    plan.inputs.iter().any(|input| !input.source.format.is_text())
 }
 
 /// The most records of which a preflight reads all, only to know whether a point is left.

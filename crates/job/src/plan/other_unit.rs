@@ -2,8 +2,8 @@
 //! and the terrain would be placed far from where it is.
 
 use crs::{Crs, CrsChoice, Unit, same_length};
+use points::Source;
 use points::options::InputOptions;
-use points::{FileFormat, Source};
 use sys::{Error, Result, Warnings, of_inputs};
 
 /// Checks that the unit of x and y that the user names is that of the system of every source.
@@ -27,7 +27,7 @@ pub(super) fn refuse_other_unit(sources: &[Source], options: &InputOptions) -> R
             Some(missing) if !is_named(&source) && source.own_crs().metres_per_unit().is_none() => {
                 refuse(&missing.crs, || "[input] missing_crs is".into(), options)
             }
-            _ if is_named(&source) && source.format != FileFormat::Text => {
+            _ if is_named(&source) && !source.format.is_text() => {
                 refuse_degrees_as_lengths(source.own_crs(), std::slice::from_ref(source), || of_file(source), options)?;
                 refuse(source.own_crs(), || of_file(source), options)
             }
@@ -113,7 +113,7 @@ fn dropped_unit(source: &Source, [plane, heights]: [f64; 2]) -> Option<String> {
     if crs.horizontal == Unit::Degree && may_be_degrees(source) {
         return Some("degree for x and y".into());
     }
-    let is_text = source.format == FileFormat::Text;
+    let is_text = source.format.is_text();
     let other = |own: Option<f64>, taken: f64| own.filter(|own| !is_text && !same_length(*own, taken));
     let name = |metres| Unit::from_metres(Some(metres)).name();
     let of_false_record = || source.unit_of_false_record().and_then(|unit| unit.metres_per_unit());

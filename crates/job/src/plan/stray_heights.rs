@@ -10,7 +10,7 @@ use crate::plan::rounded_box::rounded_heights;
 use crate::plan::suspect_heights::{own_height, shown_own_height};
 use delaunay::geometry::Bounds;
 use lattice::Lattice;
-use points::{FileFormat, KeptHeights, OptionalFields, PointRules, Source};
+use points::{KeptHeights, OptionalFields, PointRules, Source};
 use rayon::prelude::*;
 use sys::{Result, interrupt};
 
@@ -281,7 +281,7 @@ fn are_neighbours([min, max]: SourceBox, other: SourceBox) -> bool {
 /// that the plan has taken, and the plan could not know it.
 pub(crate) fn unforeseen_heights(source: &Source, read: Option<Bounds<3>>, plan: &Plan) -> Option<String> {
     let (Bounds { min, max }, known) = (read?, plan.heights?);
-    if source.format == FileFormat::Text && plan.records <= MOST_RECORDS || plan.options.input.heights.is_some() {
+    if source.format.is_text() && plan.records <= MOST_RECORDS || plan.options.input.heights.is_some() {
         return None;
     }
     let (offset, step) = (to_float(plan.lattice.offset[2]), to_float(plan.lattice.resolution_z));

@@ -6,9 +6,7 @@ use crate::plan::height_range::HeightSample;
 use crate::plan::text_inputs::row_choice;
 use delaunay::geometry::Bounds;
 use lattice::Lattice;
-use points::{
-    Axis, Extremes, FileFormat, Source, SuspectHeight, is_nodata_beside, is_number_in_steps, shown_height, who_has,
-};
+use points::{Axis, Extremes, Source, SuspectHeight, is_nodata_beside, is_number_in_steps, shown_height, who_has};
 
 /// What is doubtful about the heights of a file.
 struct Doubt {
@@ -32,7 +30,7 @@ pub(crate) fn check_suspect_heights(
 ) -> crate::Result<Vec<String>> {
     let mut warnings = Vec::new();
     // Of a text with outliers the heights show nothing but these.
-    let is_told = |source: &&Source| source.format != FileFormat::Text || source.outliers() == 0;
+    let is_told = |source: &&Source| !source.format.is_text() || source.outliers() == 0;
     for source in sources.iter().filter(|_| options.input.nodata.is_on()).filter(is_told) {
         let of = |heights: &Extremes| doubt_about(source, heights, lattice, options, metres);
         let doubt = match source.heights_of_text() {
@@ -64,7 +62,7 @@ fn doubt_about(
     options: &JobOptions,
     metres: f64,
 ) -> Option<Doubt> {
-    let is_text = source.format == FileFormat::Text;
+    let is_text = source.format.is_text();
     let step = to_float(lattice.resolution_z) / source.factor_of_heights();
     let found = (!is_text).then(|| heights.nodata(|value| is_number_in_steps(value, step)));
     if let Some(height) = found.as_ref().and_then(|found| found.heights.first()) {
@@ -99,7 +97,7 @@ pub(crate) fn unannounced_nodata(
     lattice: &Lattice,
     options: &JobOptions,
 ) -> Option<String> {
-    let Bounds { min, max } = read.filter(|_| source.format != FileFormat::Text && options.input.nodata.is_on())?;
+    let Bounds { min, max } = read.filter(|_| !source.format.is_text() && options.input.nodata.is_on())?;
     let step = to_float(lattice.resolution_z) / source.factor_of_heights();
     let claimed = [source.min[2], source.max[2]].map(|height| height / source.factor_of_heights());
     let is_nodata = |value: &f64| is_nodata_beside(*value, step, claimed);

@@ -8,7 +8,7 @@ use crs::{CrsChoice, CrsKind, Unit};
 use points::options::{InputOptions, OnBadFile, UnitChoice};
 use points::surface::Surface;
 use points::surface_warnings::no_column_of_classes;
-use points::{FileFormat, KeptReturns, OptionalFields, PointCounts, PointRules, RowChoice, Source, TextReading};
+use points::{KeptReturns, OptionalFields, PointCounts, PointRules, RowChoice, Source, TextReading};
 use rayon::prelude::*;
 use sys::{Error, Result, interrupt};
 
@@ -19,7 +19,7 @@ pub(crate) fn row_choice(options: &JobOptions) -> RowChoice {
 
 /// Returns how the texts of a plan are read.
 pub(crate) fn text_reading(plan: &Plan) -> TextReading {
-    let sources = || plan.inputs.iter().map(|input| &input.source).filter(|source| source.format == FileFormat::Text);
+    let sources = || plan.inputs.iter().map(|input| &input.source).filter(|source| source.format.is_text());
     let OptionalFields { rgb, intensity } = wanted_fields(&plan.options);
     TextReading {
         colors: rgb,
@@ -41,7 +41,7 @@ pub(crate) fn wanted_fields(options: &JobOptions) -> OptionalFields {
 /// # Errors
 /// [`Error::Config`] names the first such file.
 pub(crate) fn refuse_degrees(sources: &[Source], options: &InputOptions) -> Result<()> {
-    let is_in_degrees = |s: &&Source| s.format == FileFormat::Text && s.crs.horizontal == Unit::Degree;
+    let is_in_degrees = |s: &&Source| s.format.is_text() && s.crs.horizontal == Unit::Degree;
     // What is said of longitude and latitude is refused elsewhere.
     let is_map = match &options.crs {
         CrsChoice::Given { crs, .. } => crs.kind == CrsKind::Projected,
@@ -89,7 +89,7 @@ pub(crate) fn refuse_missing_classes(sources: &[Source], options: &InputOptions)
     if !options.chooses_classes() || options.kept_classes()[0] {
         return Ok(());
     }
-    let lacks_classes = |source: &&Source| source.format == FileFormat::Text && !source.has_class;
+    let lacks_classes = |source: &&Source| source.format.is_text() && !source.has_class;
     match (sources.iter().find(lacks_classes), &options.classes) {
         // As for a LAS file without ground.
         (Some(source), _) if options.surface == Surface::Ground => {
@@ -118,7 +118,7 @@ pub(crate) fn refuse_missing_returns(sources: &[Source], options: &InputOptions)
         KeptReturns::Last => "return_number and number_of_returns",
         KeptReturns::First | KeptReturns::Numbers(_) => "return_number",
     };
-    match sources.iter().find(|source| source.format == FileFormat::Text && !source.has_returns) {
+    match sources.iter().find(|source| source.format.is_text() && !source.has_returns) {
         Some(source) => Err(Error::Config(format!(
             "[input] surface or returns choose some returns, but {} has no returns: it needs {columns}; \
              name the columns with `columns` under [input.csv], leave the file out, or keep all returns",
@@ -199,7 +199,7 @@ pub(crate) fn too_many_malformed(counts: &PointCounts, malformed: u64, records: 
 pub(crate) fn check_malformed_rows(sources: &[Source], rules: &[PointRules], options: &JobOptions) -> Result<()> {
     let input = &options.input;
     let fraction = input.max_malformed_fraction.0;
-    let is_known = |source: &&Source| source.format == FileFormat::Text || source.outliers() > 0;
+    let is_known = |source: &&Source| source.format.is_text() || source.outliers() > 0;
     let rows = |source: &Source| (source.known_malformed(), source.records);
     let all = sources.iter().map(rows).fold((0, 0), |(bad, records), more| (bad + more.0, records + more.1));
     for (source, rules) in
