@@ -4,9 +4,9 @@
 //! triangulates what is selected, and selects the worst points of the triangles where they exceed the bound, but for those that a worse one beside
 //! them may make superfluous (`rounds.rs`). Rounds go over samples of the cloud first (`sample.rs`).
 //!
-//! The canonical triangulation of a set of sites is unique, a round looks at nothing but a triangle and the points in it, and all of its points
-//! join at once. Which points are in a sample goes by their places. So the selection depends on the points and the bound alone, not on how the points are divided into blocks, on
-//! threads or on the machine. All decisions are exact, in integers.
+//! The canonical triangulation of a set of sites is unique, a round looks at nothing but a triangle, those beside it and the points in
+//! them, and all of its points join at once. Which points are in a sample goes by their places. So the selection depends on the points and the
+//! bound alone, not on how the points are divided into blocks, on threads or on the machine. All decisions are exact, in integers.
 
 #![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 

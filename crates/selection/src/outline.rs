@@ -6,26 +6,27 @@
 use crate::lattice_cells::LatticeCells;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 /// A cell has so many points on average, or up to four times as many. So points along the outline are some 25 to 50 spacings of the box apart.
 const POINTS_PER_CELL: u64 = 512;
 
-/// The points of a cell that are farthest west, east, south and north.
-type Outermost = [[i32; 3]; 4];
-
-/// The outline of a cloud, or of a part of it.
+/// The cells of a cloud, some of which are marked, such as those with points.
 #[derive(Clone, Debug)]
-pub(crate) struct Outline {
+pub(crate) struct MarkedCells {
     cells: LatticeCells,
     bounds: Bounds<2>,
-    /// The cells with points.
-    known: HashMap<[i32; 2], Outermost>,
+    /// The column and the row of the first cell, southwest of the box.
+    first: [i32; 2],
+    /// The number of columns and rows, which lead beyond the box on each side.
+    count: [usize; 2],
+    /// One bit for each cell, row by row.
+    marks: Vec<u64>,
 }
 
-impl Outline {
-    /// Returns the outline without points, of `points` points in `bounds` on a lattice with this `offset`.
-    pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2]) -> Outline {
+impl MarkedCells {
+    /// Returns the cells of `points` points in `bounds` on a lattice with this `offset`, without marks.
+    pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2]) -> MarkedCells {
         let longest = bounds.extent(0).max(bounds.extent(1));
         let cells = |wanted: u64| LatticeCells::new(bounds, points, wanted, offset);
         // Points along a line have no more cells than the same number in a square.
@@ -35,7 +36,101 @@ impl Outline {
         };
         let found = (0..30).map(|times| cells(POINTS_PER_CELL << times)).find(is_wide_enough);
         let cells = found.unwrap_or_else(|| cells(u64::MAX));
-        Outline { cells, bounds, known: HashMap::new() }
+        let [first, last] = [bounds.min, bounds.max].map(|[x, y]| cells.of(x, y));
+        let count = [0, 1].map(|axis| (last[axis] - first[axis]) as usize + 3);
+        let marks = vec![0; (count[0] * count[1]).div_ceil(64)];
+        MarkedCells { cells, bounds, first: first.map(|first| first - 1), count, marks }
+    }
+
+    /// Marks the cells of points.
+    pub(crate) fn add(&mut self, points: &[[i32; 3]]) {
+        points.iter().for_each(|&[x, y, _]| _ = self.mark(self.cells.of(x, y)));
+    }
+
+    /// Returns the cells of bays, of which these are the cells with points. A bay is at least two cells wide, connected to what is around the box,
+    /// and the middles of its cells lie in the `hull` of the points.
+    pub(crate) fn bays(&self, hull: &[[i32; 3]]) -> MarkedCells {
+        let hull: Vec<Site> = hull.iter().map(|[x, y, _]| [*x, *y]).collect();
+        let (outside, mut bays) = (self.outside(), self.without_marks());
+        for cell in self.all() {
+            let square = [0, 1, 2, 3].map(|corner| [cell[0] + corner % 2, cell[1] + corner / 2]);
+            if square.iter().all(|cell| outside.has(*cell)) {
+                square.into_iter().filter(|cell| self.is_in_hull(*cell, &hull)).for_each(|cell| _ = bays.mark(cell));
+            }
+        }
+        bays
+    }
+
+    /// Returns the cells without marks that are connected to those just around the box.
+    fn outside(&self) -> MarkedCells {
+        let (mut outside, mut next) = (self.without_marks(), vec![self.first]);
+        outside.mark(self.first);
+        while let Some(cell) = next.pop() {
+            for cell in beside(cell) {
+                if self.number(cell).is_some() && !self.has(cell) && outside.mark(cell) {
+                    next.push(cell);
+                }
+            }
+        }
+        outside
+    }
+
+    fn without_marks(&self) -> MarkedCells {
+        MarkedCells { marks: vec![0; self.marks.len()], ..*self }
+    }
+
+    fn all(&self) -> impl Iterator<Item = [i32; 2]> {
+        let [columns, rows] = self.count.map(|count| 0..count as i32);
+        let [first_column, first_row] = self.first;
+        rows.flat_map(move |row| columns.clone().map(move |column| [first_column + column, first_row + row]))
+    }
+
+    /// Returns the number of a cell; `None` if it is too far from the box.
+    fn number(&self, cell: [i32; 2]) -> Option<usize> {
+        let [column, row] = [0, 1].map(|axis| (cell[axis] - self.first[axis]) as usize);
+        (column < self.count[0] && row < self.count[1]).then_some(row * self.count[0] + column)
+    }
+
+    fn has(&self, cell: [i32; 2]) -> bool {
+        self.number(cell).is_some_and(|number| self.marks[number / 64] >> (number % 64) & 1 == 1)
+    }
+
+    /// Marks a cell. Tells whether it had no mark.
+    fn mark(&mut self, cell: [i32; 2]) -> bool {
+        let Some(number) = self.number(cell) else { return false };
+        let (marks, mark) = (&mut self.marks[number / 64], 1 << (number % 64));
+        let is_new = *marks & mark == 0;
+        *marks |= mark;
+        is_new
+    }
+
+    fn is_in_hull(&self, cell: [i32; 2], hull: &[Site]) -> bool {
+        let Bounds { min, max } = self.bounds;
+        let [x, y] = self.cells.middle(cell);
+        let is_within = |value: i64, axis: usize| (i64::from(min[axis])..=i64::from(max[axis])).contains(&value);
+        if hull.len() < 3 || !is_within(x, 0) || !is_within(y, 1) {
+            return false;
+        }
+        let middle = [x as i32, y as i32];
+        (0..hull.len()).all(|k| orient2d(hull[k], hull[(k + 1) % hull.len()], middle) > 0)
+    }
+}
+
+/// The points of a cell that are farthest west, east, south and north.
+type Outermost = [[i32; 3]; 4];
+
+/// What may be the outline of a cloud, or of a part of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Outline {
+    cells: LatticeCells,
+    /// Those with points.
+    known: HashMap<[i32; 2], Outermost>,
+}
+
+impl Outline {
+    /// Returns the outline without points, of a cloud with these cells.
+    pub(crate) fn none(cells: &MarkedCells) -> Outline {
+        Outline { cells: cells.cells, known: HashMap::new() }
     }
 
     /// Adds points.
@@ -60,53 +155,19 @@ impl Outline {
         other.known.into_iter().for_each(|(cell, outermost)| self.offer(cell, outermost));
     }
 
-    /// Returns the points that are nearest to a bay, one for each side on which a cell with points meets it. A bay is made of cells outside whose middles lie
-    /// in the `hull`, and is at least two cells wide.
-    pub(crate) fn points(&self, hull: &[[i32; 3]]) -> Vec<[i32; 3]> {
-        let hull: Vec<Site> = hull.iter().map(|[x, y, _]| [*x, *y]).collect();
-        let (outside, mut points) = (wide(&self.outside()), Vec::new());
-        for (cell, outermost) in &self.known {
-            let towards_outside = beside(*cell).zip(outermost);
-            let wanted = towards_outside.filter(|(cell, _)| outside.contains(cell) && self.is_in_hull(*cell, &hull));
-            points.extend(wanted.map(|(_, point)| *point));
-        }
-        points
+    /// Marks the cells with points.
+    pub(crate) fn mark(&self, cells: &mut MarkedCells) {
+        self.known.keys().for_each(|cell| _ = cells.mark(*cell));
     }
 
-    /// Returns the cells without points that are connected to the border of the box, and those just around the box.
-    fn outside(&self) -> HashSet<[i32; 2]> {
-        let [first, last] = [self.bounds.min, self.bounds.max].map(|[x, y]| self.cells.of(x, y));
-        let is_near = |cell: &[i32; 2]| (0..2).all(|axis| (first[axis] - 1..=last[axis] + 1).contains(&cell[axis]));
-        let corner = [first[0] - 1, first[1] - 1];
-        let (mut outside, mut next) = (HashSet::from([corner]), vec![corner]);
-        while let Some(cell) = next.pop() {
-            for cell in beside(cell).filter(is_near) {
-                if !self.known.contains_key(&cell) && outside.insert(cell) {
-                    next.push(cell);
-                }
-            }
-        }
-        outside
+    /// Returns the points that are nearest to one of the `bays`, one for each side on which a cell with points meets it.
+    pub(crate) fn points(&self, bays: &MarkedCells) -> Vec<[i32; 3]> {
+        let towards_bays = |(cell, outermost): (&[i32; 2], &Outermost)| {
+            let beside = beside(*cell).zip(*outermost);
+            beside.filter(|(cell, _)| bays.has(*cell)).map(|(_, point)| point).collect::<Vec<_>>()
+        };
+        self.known.iter().flat_map(towards_bays).collect()
     }
-
-    fn is_in_hull(&self, cell: [i32; 2], hull: &[Site]) -> bool {
-        let Bounds { min, max } = self.bounds;
-        let [x, y] = self.cells.middle(cell);
-        let is_within = |value: i64, axis: usize| (i64::from(min[axis])..=i64::from(max[axis])).contains(&value);
-        if hull.len() < 3 || !is_within(x, 0) || !is_within(y, 1) {
-            return false;
-        }
-        let middle = [x as i32, y as i32];
-        (0..hull.len()).all(|k| orient2d(hull[k], hull[(k + 1) % hull.len()], middle) > 0)
-    }
-}
-
-/// Returns the cells that are part of a square of four such cells.
-fn wide(cells: &HashSet<[i32; 2]>) -> HashSet<[i32; 2]> {
-    let square = |[column, row]: [i32; 2]| [0, 1, 2, 3].map(|corner| [column + corner % 2, row + corner / 2]);
-    let squares =
-        cells.iter().map(|cell| square(*cell)).filter(|square| square.iter().all(|cell| cells.contains(cell)));
-    squares.flatten().collect()
 }
 
 /// Returns the cells beside one in the west, the east, the south and the north.
@@ -131,16 +192,22 @@ mod tests {
         all.filter(|[x, y, _]| *x < width || *y < width).collect()
     }
 
+    fn cells(points: &[[i32; 3]]) -> MarkedCells {
+        let bounds = Bounds::of_points(points.iter().map(|[x, y, _]| [*x, *y])).unwrap();
+        MarkedCells::none(bounds, points.len() as u64, [0; 2])
+    }
+
     fn outline(blocks: &[&[[i32; 3]]]) -> Vec<[i32; 3]> {
         let all = blocks.concat();
-        let bounds = Bounds::of_points(all.iter().map(|[x, y, _]| [*x, *y])).unwrap();
-        let mut outline = Outline::none(bounds, all.len() as u64, [0; 2]);
+        let mut cells = cells(&all);
+        let mut outline = Outline::none(&cells);
         for block in blocks {
-            let mut of_block = Outline::none(bounds, all.len() as u64, [0; 2]);
+            let mut of_block = Outline::none(&cells);
             of_block.add(block);
             outline.join(of_block);
         }
-        let mut points = outline.points(&hull_corners(all));
+        outline.mark(&mut cells);
+        let mut points = outline.points(&cells.bays(&hull_corners(all)));
         points.sort_unstable();
         points
     }
@@ -169,10 +236,11 @@ mod tests {
     #[test]
     fn along_a_line_there_are_few_cells() {
         let points: Vec<[i32; 3]> = (0..10_000).map(|i| [i * 50_000, i % 2, 0]).collect();
-        let bounds = Bounds::of_points(points.iter().map(|[x, y, _]| [*x, *y])).unwrap();
-        let mut outline = Outline::none(bounds, points.len() as u64, [0; 2]);
-        outline.add(&points);
-        assert!(outline.known.len() <= 20 && outline.outside().len() <= 60);
+        let mut cells = cells(&points);
+        cells.add(&points);
+        let count = |cells: &MarkedCells| cells.marks.iter().map(|marks| marks.count_ones()).sum::<u32>();
+        assert!((1..=20).contains(&count(&cells)) && cells.all().count() <= 80);
+        assert_eq!(count(&cells.outside()) as usize + count(&cells) as usize, cells.all().count());
     }
 
     #[test]
@@ -180,6 +248,18 @@ mod tests {
         let points = arms(90);
         let (first, second) = points.split_at(points.len() / 3);
         assert_eq!(outline(&[&points]), outline(&[second, first]));
+        // That of each part, if the bays are known.
+        let mut cells = cells(&points);
+        [second, first].iter().for_each(|points| cells.add(points));
+        let bays = cells.bays(&hull_corners(points.clone()));
+        let of_part = |points: &[[i32; 3]]| {
+            let mut outline = Outline::none(&bays);
+            outline.add(points);
+            outline.points(&bays)
+        };
+        let of_parts = [of_part(first), of_part(second)].concat();
+        assert!(outline(&[&points]).iter().all(|point| of_parts.contains(point)));
+        assert!(of_parts.len() < 2 * outline(&[&points]).len());
         assert!(!outline(&[&points]).is_empty());
     }
 }

@@ -5,14 +5,17 @@
 //!
 //! Regions are cells of the lattice, and how large they are depends on the number of the points and their box alone. So does the result.
 
+use crate::hull::hull_corners;
 use crate::lattice_cells::LatticeCells;
 use crate::memory::BlockMemory;
+use crate::outline::MarkedCells;
 use crate::rounds::BlockState;
 use crate::source::{BlockPoints, PointSource, SelectionStore};
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 /// How clouds are divided.
 #[derive(Clone, Copy, Debug)]
@@ -31,13 +34,15 @@ impl RegionSizes {
 
 /// A cloud in regions.
 pub(crate) struct Division<'a, E> {
+    /// Its bays.
+    pub(crate) bays: MarkedCells,
     /// What is known of all blocks of the cloud.
     pub(crate) blocks: Vec<BlockState>,
     /// The regions that have points.
     pub(crate) regions: Vec<Region<'a, E>>,
 }
 
-/// Divides a cloud, which has `points` points in `bounds`. Points of its blocks that are in `memory` do not stay there.
+/// Divides a cloud, which has `points` points in `bounds`, and looks for its bays. Points of its blocks that are in `memory` do not stay there.
 ///
 /// # Errors
 /// Those of `source`.
@@ -50,11 +55,16 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
     sizes: RegionSizes,
 ) -> Result<Division<'a, E>, E> {
     let cells = LatticeCells::new(bounds, points, sizes.points, source.offset());
+    let marked = Mutex::new((MarkedCells::none(bounds, points, source.offset()), Vec::new()));
     let share = |(number, mut state): (usize, BlockState)| {
+        let points = state.take_points(source, memory, number)?;
         let mut shares = BTreeMap::<[i32; 2], Bounds<2>>::new();
-        for [x, y, _] in state.take_points(source, memory, number)? {
+        for &[x, y, _] in &points {
             shares.entry(cells.of(x, y)).or_insert(Bounds::of_point([x, y])).include([x, y]);
         }
+        let (marked, hull) = &mut *marked.lock().unwrap_or_else(PoisonError::into_inner);
+        marked.add(&points);
+        *hull = hull_corners([std::mem::take(hull), hull_corners(points)].concat());
         Ok((state, shares))
     };
     let found = blocks.into_par_iter().enumerate().with_max_len(1).map(share).collect::<Result<Vec<_>, E>>()?;
@@ -69,7 +79,8 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
         }
     }
     let region = |(cell, (bounds, blocks))| Region { source, cells, cell, blocks, bounds, taken: 0 };
-    Ok(Division { blocks, regions: regions.into_iter().map(region).collect() })
+    let (marked, hull) = marked.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(Division { bays: marked.bays(&hull), blocks, regions: regions.into_iter().map(region).collect() })
 }
 
 /// The points of a cloud that lie in a cell of the lattice.

@@ -3,7 +3,7 @@
 
 use crate::hull::hull_corners;
 use crate::lattice_cells::LatticeCells;
-use crate::outline::Outline;
+use crate::outline::{MarkedCells, Outline};
 use delaunay::geometry::Bounds;
 use std::collections::HashMap;
 
@@ -22,10 +22,10 @@ pub(crate) struct Seeds {
 }
 
 impl Seeds {
-    /// Returns no seeds for `points` points in `bounds`, on a lattice with this `offset`.
-    pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2]) -> Seeds {
+    /// Returns no seeds for `points` points in `bounds`, on a lattice with this `offset`. The outline is looked for in `cells_of_outline`.
+    pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2], cells_of_outline: &MarkedCells) -> Seeds {
         let cells = LatticeCells::new(bounds, points, POINTS_PER_CELL, offset);
-        let outline = Outline::none(bounds, points, offset);
+        let outline = Outline::none(cells_of_outline);
         Seeds { cells, hull: Vec::new(), by_cell: HashMap::new(), outline, fixed: Vec::new() }
     }
 
@@ -62,9 +62,15 @@ impl Seeds {
         &self.hull
     }
 
-    /// Returns all seeds once, in order.
-    pub(crate) fn into_points(self) -> Vec<[i32; 3]> {
-        let outline = self.outline.points(&self.hull);
+    /// Returns the bays of a cloud with these `cells`, none of which is marked, if all of its points have been added.
+    pub(crate) fn bays(&self, mut cells: MarkedCells) -> MarkedCells {
+        self.outline.mark(&mut cells);
+        cells.bays(&self.hull)
+    }
+
+    /// Returns all seeds once, in order, those along these `bays` among them.
+    pub(crate) fn into_points(self, bays: &MarkedCells) -> Vec<[i32; 3]> {
+        let outline = self.outline.points(bays);
         let mut all: Vec<[i32; 3]> =
             self.by_cell.into_values().chain(self.hull).chain(outline).chain(self.fixed).collect();
         all.sort_unstable();

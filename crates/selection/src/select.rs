@@ -3,6 +3,7 @@
 use crate::error_bound::ErrorBound;
 use crate::hull::hull_corners;
 use crate::memory::BlockMemory;
+use crate::outline::MarkedCells;
 use crate::regions::{Division, RegionSizes, divide};
 use crate::rounds::{BlockState, Rounds, Selection};
 use crate::sample::Sample;
@@ -18,14 +19,16 @@ use rayon::prelude::*;
 /// # Errors
 /// Those of `source`.
 pub fn select<S: PointSource>(source: &S, bound: ErrorBound) -> Result<Selection<'_>, S::Error> {
-    select_by_regions(source, bound, RegionSizes::USUAL)
+    select_by_regions(source, bound, RegionSizes::USUAL, None)
 }
 
-/// As [`select`]. A cloud of many points is divided into regions by the lattice, and points are selected from each of these by itself first.
+/// As [`select`]. A cloud of many points is divided into regions by the lattice, and points are selected from each of these by itself first. The
+/// `bays` are those of the whole cloud, if this is a part of it.
 pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
     source: &'a dyn PointSource<Error = E>,
     bound: ErrorBound,
     sizes: RegionSizes,
+    bays: Option<&MarkedCells>,
 ) -> Result<Selection<'a>, E> {
     let memory = BlockMemory::new(source.memory());
     let blocks = load_blocks(source, &memory)?;
@@ -33,18 +36,22 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
     let bounds = bounds.unwrap_or(Bounds::of_point([0, 0]));
     let points = blocks.iter().map(|state| state.points).sum();
     if points <= sizes.undivided {
-        let seeds = seeds_of(source, &blocks, Seeds::none(bounds, points, source.offset()))?;
+        let cells = MarkedCells::none(bounds, points, source.offset());
+        let none = Seeds::none(bounds, points, source.offset(), bays.unwrap_or(&cells));
+        let seeds = seeds_of(source, &blocks, none)?;
+        let bays = bays.cloned().unwrap_or_else(|| seeds.bays(cells));
         let hull = seeds.hull().to_vec();
         let mut rounds = Rounds::new(source, blocks, bounds, memory);
-        rounds.add(seeds.into_points())?;
+        rounds.add(seeds.into_points(&bays))?;
         return rounds.run(hull, 0, bound, Sample::ladder(source.offset()));
     }
-    let Division { blocks, regions } = divide(source, blocks, &memory, bounds, points, sizes)?;
+    let Division { bays: own, blocks, regions } = divide(source, blocks, &memory, bounds, points, sizes)?;
+    let bays = bays.unwrap_or(&own);
     let mut rounds = Rounds::new(source, blocks, bounds, memory);
     let (mut corners, mut most) = (Vec::new(), 0);
     for region in &regions {
         let region = region.after(rounds.selected_bytes());
-        let of_region = select_by_regions(&region, bound, sizes)?;
+        let of_region = select_by_regions(&region, bound, sizes, Some(bays))?;
         most = most.max(of_region.figures.rounds);
         let selected = of_region.sites.within(region.bounds)?;
         corners.extend(hull_corners(selected.clone()));

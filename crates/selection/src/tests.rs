@@ -373,7 +373,7 @@ fn regions_depend_on_the_points_alone() {
             let mut cloud = Cloud::new(&points, &points[700..702], side, memory);
             cloud.offset = offset.map(i64::from);
             let bounds = bounds_of(&points);
-            let found = crate::select::select_by_regions(&cloud, bound, sizes).unwrap();
+            let found = crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap();
             let mut all: Vec<_> = found.sites.within(bounds).unwrap().into_iter().map(back).collect();
             all.sort_unstable();
             let worst = found.figures.worst.map(back);
@@ -390,4 +390,19 @@ fn regions_depend_on_the_points_alone() {
         assert!(points[700..702].iter().all(|point| chosen.contains(point)));
         assert!(figures.greatest <= 12 << 20 && found.len() < points.len() * 9 / 10, "{}", found.len());
     }
+}
+
+/// A region in which the shore of a bay is straight has points along it too.
+#[test]
+fn bays_are_those_of_the_whole_cloud() {
+    let all = (0..256).flat_map(|y| (0..256).map(move |x| [x, y, 7]));
+    let points: Vec<[i32; 3]> = all.filter(|[x, y, _]| *x < 70 || *y < 70).collect();
+    let sizes = crate::regions::RegionSizes { undivided: 16_000, points: 1_000 };
+    let cloud = Cloud::new(&points, &[], 90, AMPLE);
+    let found = crate::select::select_by_regions(&cloud, ErrorBound::new(1, 1), sizes, None).unwrap();
+    let found = found.sites.within(bounds_of(&points)).unwrap();
+    let along = |rows: std::ops::Range<i32>| found.iter().filter(|[x, y, _]| *x == 69 && rows.contains(y)).count();
+    // A cell is 64 steps wide.
+    assert!(along(128..192) > 0 && along(192..256) > 0, "{found:?}");
+    assert!(found.len() < 60, "{}", found.len());
 }
