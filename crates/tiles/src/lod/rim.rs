@@ -5,6 +5,8 @@
 use crate::lod::filling::{Border, CoarseMesh, Filling};
 use crate::lod::fit::{Sample, distance_above, improve, samples, volume};
 use crate::lod::outline::Outline;
+use crate::lod::vertex_cells::plane;
+use delaunay::geometry::predicates::orient2d;
 use sys::Result;
 
 /// A simplified terrain for viewers.
@@ -28,8 +30,8 @@ impl ShownMesh {
 }
 
 /// Returns the triangles of `filling` that `covers` tells of, with a border that is raised by what the `outline` of the terrain at `positions` is
-/// above them. Skirts reach below the outline by [`SPARE`] times the mean error in steps of z. `areas` are those of [`samples`]. `may_move` tells which
-/// vertices of the terrain are no parts of lines.
+/// above them. Skirts reach below the outline by [`SPARE`] times the `mean_error` in steps of z, or as far as the ground may fall to the border.
+/// `areas` are those of [`samples`]. `may_move` tells which vertices of the terrain are no parts of lines.
 pub(crate) fn shown(
     (positions, areas): (&[[i32; 3]], &[f64]),
     outline: &Outline,
@@ -42,8 +44,10 @@ pub(crate) fn shown(
     let border = filling.border(covers);
     let reaches = reaches(positions, outline, filling, &border.edges, places);
     let (mut mesh, number) = filling.coarse(covers);
+    let spare = SPARE * mean_error;
+    let deepest = positions.iter().map(|p| p[2]).min().map_or(0.0, f64::from) - spare;
     let heights: Vec<[i32; 2]> =
-        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], SPARE * mean_error)).collect();
+        filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], spare, deepest)).collect();
     let before: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
     let mut fitted = before.clone();
     let mut is_on_border = vec![false; fitted.len()];
@@ -82,6 +86,9 @@ pub(crate) fn shown(
 
 /// How many times the mean error skirts reach below the outline: the border lies over the neighbour's ground, which may fall away there.
 const SPARE: f64 = 2.0;
+
+/// How many times as steep as the simplified terrain the neighbour's ground may fall from the outline to the border.
+const STEEPER: f64 = 2.0;
 
 /// How many times the mean error the heights beside the border may move. In woods, what makes up for a border as high as the crowns would
 /// be a ditch.
@@ -154,7 +161,11 @@ fn reaches(
             let edge = BorderEdge { ends: [from, to].map(|site| filling.positions[site as usize]) };
             let count = (last + ring.len() - first) % ring.len() + 1;
             let vertices = (first..first + count).map(|at| ring[at % ring.len()]);
-            let offset = |v: u32| Offset { share: edge.share(positions[v as usize]), above: above(v) };
+            let offset = |v: u32| {
+                let (position, triangle) = (positions[v as usize], places[v as usize] as usize);
+                let drop = STEEPER * edge.distance(position) * slope(filling, triangle);
+                Offset { share: edge.share(position), above: above(v), drop }
+            };
             let along: Vec<Offset> = vertices.map(offset).collect();
             let mut ends = [from, to].map(|site| reaches[site as usize]);
             raise(&mut ends, edge.ends.map(|end| f64::from(highest) - f64::from(end[2])), &along);
@@ -192,7 +203,11 @@ fn raise(ends: &mut [Reach; 2], most: [f64; 2], along: &[Offset]) {
         }
     }
     let lowest = along.iter().map(|offset| offset.above).fold(0.0, f64::min);
-    ends.iter_mut().for_each(|end| end.below = end.below.min(lowest));
+    let drop = along.iter().map(|offset| offset.drop).fold(0.0, f64::max);
+    ends.iter_mut().for_each(|end| {
+        end.below = end.below.min(lowest);
+        end.drop = end.drop.max(drop);
+    });
 }
 
 /// How often the ends of an edge are raised vertex by vertex, by as little as it takes.
@@ -204,6 +219,8 @@ struct Offset {
     share: f64,
     /// How far the vertex is above the simplified terrain, in steps of z.
     above: f64,
+    /// How far the ground may fall from the vertex to the edge, in steps of z.
+    drop: f64,
 }
 
 impl Offset {
@@ -232,6 +249,22 @@ impl BorderEdge {
         let product = |p: [i32; 3]| along(p, 0) * along(to, 0) + along(p, 1) * along(to, 1);
         (product(point) / product(to)).clamp(0.0, 1.0)
     }
+
+    /// Returns the distance of `point` from the line of the edge in the plane, in lattice steps.
+    fn distance(&self, point: [i32; 3]) -> f64 {
+        let [from, to] = self.ends.map(plane);
+        let [x, y] = [0, 1].map(|axis| f64::from(to[axis]) - f64::from(from[axis]));
+        (orient2d(from, to, plane(point)) as f64).abs() / (x * x + y * y).sqrt()
+    }
+}
+
+/// Returns how steep a triangle of `filling` is, in steps of z for each lattice step.
+fn slope(filling: &Filling, triangle: usize) -> f64 {
+    let corners = filling.corners(triangle).map(|site| filling.positions[site as usize]);
+    let [[ux, uy, uz], [vx, vy, vz]] =
+        [1, 2].map(|k| [0, 1, 2].map(|axis| f64::from(corners[k][axis]) - f64::from(corners[0][axis])));
+    let [x, y, area] = [uz * vy - vz * uy, ux * vz - vx * uz, ux * vy - uy * vx];
+    (x * x + y * y).sqrt() / area.abs()
 }
 
 /// How far an outline is above and below the border near a vertex.
@@ -241,15 +274,18 @@ struct Reach {
     above: f64,
     /// The least one, at most 0.
     below: f64,
+    /// How far the ground may fall from the outline to the border.
+    drop: f64,
 }
 
 impl Reach {
     /// Returns the height of the lower end of the skirt and that of the border, at a vertex that has been at `height`. The skirt reaches `spare`
-    /// below the outline.
-    fn around(self, height: i32, spare: f64) -> [i32; 2] {
+    /// below the outline, or further where the ground may fall, down to the `deepest` height.
+    fn around(self, height: i32, spare: f64, deepest: f64) -> [i32; 2] {
         let fitted = f64::from(height);
         let top = (fitted + self.above).ceil() as i32;
-        let bottom = (fitted + self.below - spare).floor() as i32;
+        let outline = fitted + self.below;
+        let bottom = (outline - spare).min((outline - self.drop).max(deepest)).floor() as i32;
         // The two are different vertices.
         [bottom.min(top.saturating_sub(1)), top]
     }
@@ -269,9 +305,9 @@ mod tests {
             heights in prop::collection::vec((0.0f64..=1.0, -80.0f64..=0.0), 1..12),
         ) {
             let [from, to] = fitted;
-            let offset = |&(share, height): &(f64, f64)| Offset { share, above: height - from - share * (to - from) };
+            let offset = |&(share, height): &(f64, f64)| Offset { share, above: height - from - share * (to - from), drop: 0.0 };
             let along: Vec<Offset> = heights.iter().map(offset).collect();
-            let mut ends = before.map(|above| Reach { above, below: 0.0 });
+            let mut ends = before.map(|above| Reach { above, ..Reach::default() });
             raise(&mut ends, fitted.map(|height| -height), &along);
             for (offset, (_, height)) in along.iter().zip(&heights) {
                 prop_assert!(offset.missing(&ends) < 1e-9, "{} at {}", offset.missing(&ends), height);

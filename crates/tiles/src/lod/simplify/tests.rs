@@ -254,6 +254,25 @@ fn skirts_hang_below_the_whole_border() {
     }
 }
 
+/// The border is beyond the outline, over ground of neighbours, which may fall away from it as this one does.
+#[test]
+fn skirts_end_below_a_neighbours_slope() {
+    let hills: [fn(i32, i32) -> i32; 3] = [|x, _| 3 * x, |x, y| -2 * x - y, |x, y| (x - y) * 3 / 2];
+    for hill in hills {
+        let tile = ragged(48, &[([200, 200], 60)], hill);
+        let Simple { shown, surface, .. } = simplified(&tile, tile.triangles.len() / 6, None);
+        let bottom = |[x, y, _]: [i32; 3]| {
+            let below = &shown.positions[surface.positions.len()..];
+            below.iter().filter(|p| p[0] == x && p[1] == y).map(|p| p[2]).min().unwrap()
+        };
+        for [from, to] in outline(&surface) {
+            let middle = [0, 1].map(|axis| (from[axis] + to[axis]) / 2);
+            let (skirt, ground) = ((bottom(from) + bottom(to)) / 2, hill(middle[0], middle[1]));
+            assert!(skirt <= ground, "{skirt} above {ground} at {middle:?}");
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn simplified_terrains_cover_the_same_ground_within_their_error(
