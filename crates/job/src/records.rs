@@ -84,7 +84,7 @@ pub enum StepRecord {
     FinishedBorder(TileIndex),
     /// The pixels of the preview that a tile covers.
     Pixels(TileIndex),
-    /// The result of the step that reads the points.
+    /// The tree of a part and what it holds ([`Partition`](crate::partition::result::Partition)).
     Partition,
     /// The points by bucket that a reader has found.
     Read(PartIndex),

@@ -1,4 +1,4 @@
-//! What step 2 leaves of a part for the steps after it.
+//! What a part has to mesh: its tree, made of the points that were read or selected, for the steps after that.
 
 use crate::durable::columns::{ColumnReader, ColumnWriter};
 use crate::index::{NodeIndex, TileIndex};
