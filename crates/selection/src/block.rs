@@ -23,6 +23,9 @@ const SELECTED: u32 = u32::MAX - 1;
 /// If more than one selected point for so many is new, all are triangulated anew.
 const SITES_PER_INSERTED: usize = 5;
 
+/// Points that are to be placed are loaded so many at a time: the processor waits for all of them at once.
+const LOADED_AT_ONCE: usize = 64;
+
 /// So many sites cost next to nothing.
 const FEW_SITES: usize = 1000;
 
@@ -437,25 +440,27 @@ impl Block {
     /// Finds the triangles of displaced points, and the worst point of each of these triangles.
     fn place_displaced(&mut self) {
         let mut displaced = std::mem::take(&mut self.displaced);
-        let mut last = 0;
-        for (number, &(point, start)) in displaced.iter().enumerate() {
-            let is_first = start == NONE;
-            last = self.place(point, if is_first { last } else { start });
-            if is_first && number % 8 == 0 {
-                self.near.set(self.points[point as usize], last);
+        let (mut last, mut places) = (0, Vec::with_capacity(LOADED_AT_ONCE));
+        for displaced in displaced.chunks(LOADED_AT_ONCE) {
+            places.extend(displaced.iter().map(|&(point, _)| self.points[point as usize]));
+            for (&(point, start), place) in displaced.iter().zip(places.drain(..)) {
+                let is_first = start == NONE;
+                last = self.place(point, place, if is_first { last } else { start });
+                if is_first {
+                    self.near.set(place, last);
+                }
             }
         }
         displaced.clear();
         self.displaced = displaced;
     }
 
-    /// Puts a point into its triangle, looking from triangle `start` on, and returns that. A selected point is in none.
+    /// Puts a point at this place into its triangle, looking from triangle `start` on, and returns that. A selected point is in none.
     ///
     /// A point on an edge belongs to the triangle on the left of the edge as seen from its lesser end: the point is thought of as moved
     /// a little towards greater y, and by far less towards lesser x.
     #[inline]
-    fn place(&mut self, point: u32, start: u32) -> u32 {
-        let [x, y, z] = self.points[point as usize];
+    fn place(&mut self, point: u32, [x, y, z]: [i32; 3], start: u32) -> u32 {
         let p = [x, y];
         let mesh = &mut self.mesh;
         let mut triangle = start as usize;

@@ -28,6 +28,11 @@ impl LatticeCells {
         [(x + self.offset[0]) >> self.shift, (y + self.offset[1]) >> self.shift]
     }
 
+    /// Returns the column of an x, or the row of a y, on a lattice without offset.
+    pub(crate) fn line(self, value: i64) -> i64 {
+        value >> self.shift
+    }
+
     /// Returns the middle of the cell in a column and a row.
     pub(crate) fn middle(self, cell: [i32; 2]) -> [i64; 2] {
         [0, 1].map(|axis| (i64::from(cell[axis]) << self.shift) - i64::from(self.offset[axis]) + self.side() / 2)

@@ -71,14 +71,14 @@ impl<'a> SelectedSites<'a> {
     /// Returns the number of points in `bounds`, and some near it.
     pub(crate) fn near(&self, bounds: Bounds<2>) -> usize {
         let mut count = self.stored.iter().map(|stored| stored.near(&bounds)).sum();
-        self.cells.for_each_cell(&bounds, |cell| count += cell.points.len());
+        self.cells.for_each_cell(&bounds, |points| count += points.len());
         count
     }
 
     /// Returns the number of points in `bounds`, and some near it, that were added last.
     pub(crate) fn newly_near(&self, bounds: Bounds<2>) -> usize {
         let mut count = 0;
-        self.cells.for_each_cell(&bounds, |cell| count += cell.newly().len());
+        self.cells.for_each_grown_cell(&bounds, |points| count += points.len());
         count
     }
 
@@ -95,14 +95,14 @@ impl<'a> SelectedSites<'a> {
     /// Returns the points in `bounds` that were added last, neighbours in the plane one after the other.
     pub(crate) fn newly_within(&self, bounds: Bounds<2>) -> Vec<[i32; 3]> {
         let mut within = Vec::new();
-        let mut add = |points: &[[i32; 3]]| within.extend(points.iter().filter(|point| is_in(&bounds, point)));
-        self.cells.for_each_cell(&bounds, |cell| add(cell.newly()));
+        let add = |points: &[[i32; 3]]| within.extend(points.iter().filter(|point| is_in(&bounds, point)));
+        self.cells.for_each_grown_cell(&bounds, add);
         within
     }
 
     /// Tells whether one of the points that were added last lies in `bounds`.
     pub(crate) fn has_newly_within(&self, bounds: Bounds<2>) -> bool {
-        self.cells.is_in_any_cell(&bounds, |cell| cell.newly().iter().any(|point| is_in(&bounds, point)))
+        self.cells.has_newly(&bounds, |point| is_in(&bounds, point))
     }
 
     /// Returns the point that lies deepest inside the circle of the triangle of `corners`, which is `disc`, or `None` if there is none. None of
@@ -131,15 +131,12 @@ impl<'a> SelectedSites<'a> {
     /// Tells whether one of the points that were added last lies inside the circle of the triangle of `corners`, which is `disc`.
     pub(crate) fn has_newly_inside(&self, corners: [Site; 3], disc: Disc) -> bool {
         let [a, b, c] = corners;
-        self.cells.is_in_any_cell(&disc, |cell| {
-            let mut newly = cell.newly().iter().map(|&[x, y, _]| [x, y]);
-            newly.any(|site| !corners.contains(&site) && in_circle(a, b, c, site))
-        })
+        self.cells.has_newly(&disc, |&[x, y, _]| !corners.contains(&[x, y]) && in_circle(a, b, c, [x, y]))
     }
 
     /// Shows `look` all points in an area, and some near it.
     fn visit(&self, area: &impl Area, mut look: impl FnMut(&[[i32; 3]])) -> Result<()> {
-        self.cells.for_each_cell(area, |cell| look(&cell.points));
+        self.cells.for_each_cell(area, &mut look);
         let Some(store) = self.store else { return Ok(()) };
         self.stored.iter().try_for_each(|stored| stored.visit(area, store, &mut look))
     }

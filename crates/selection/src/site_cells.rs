@@ -29,12 +29,14 @@ pub(crate) struct SiteCells {
     count: u64,
     /// The cells that have points which were added last.
     grown: Vec<u32>,
+    /// A bit for each cell that tells whether it is one of them: most queries are for such points, and most cells have none.
+    is_grown: Vec<u64>,
 }
 
 /// The selected points of a cell.
 #[derive(Debug, Default)]
-pub(crate) struct CellSites {
-    pub(crate) points: Vec<[i32; 3]>,
+struct CellSites {
+    points: Vec<[i32; 3]>,
     /// The number of those that were not added last.
     known: u32,
     /// If the cell is divided, the points are here instead.
@@ -43,12 +45,8 @@ pub(crate) struct CellSites {
 
 impl CellSites {
     /// Returns those that were added last.
-    pub(crate) fn newly(&self) -> &[[i32; 3]] {
+    fn newly(&self) -> &[[i32; 3]] {
         &self.points[self.known as usize..]
-    }
-
-    fn is_grown(&self) -> bool {
-        self.divided.as_ref().map_or(!self.newly().is_empty(), |divided| !divided.grown.is_empty())
     }
 
     fn append_to(&self, points: &mut Vec<[i32; 3]>) {
@@ -91,7 +89,8 @@ impl SiteCells {
 
     fn empty(cells: LatticeCells, first: [i32; 2], [columns, rows]: [usize; 2]) -> SiteCells {
         let points = std::iter::repeat_with(CellSites::default).take(columns * rows).collect();
-        SiteCells { cells, first, columns, rows, points, count: 0, grown: Vec::new() }
+        let is_grown = vec![0; (columns * rows).div_ceil(64)];
+        SiteCells { cells, first, columns, rows, points, count: 0, grown: Vec::new(), is_grown }
     }
 
     /// Returns no point of the same cloud.
@@ -108,6 +107,7 @@ impl SiteCells {
     pub(crate) fn settle(&mut self) {
         for cell in std::mem::take(&mut self.grown) {
             self.points[cell as usize].settle();
+            self.is_grown[cell as usize / 64] = 0;
         }
     }
 
@@ -115,11 +115,13 @@ impl SiteCells {
         let place = self.cells.of(point[0], point[1]);
         let [column, row] = [0, 1].map(|axis| (place[axis] - self.first[axis]) as usize);
         let number = row * self.columns + column;
-        let cell = &mut self.points[number];
-        if !cell.is_grown() {
+        let (word, bit) = (&mut self.is_grown[number / 64], 1 << (number % 64));
+        if *word & bit == 0 {
+            *word |= bit;
             self.grown.push(number as u32);
         }
         self.count += 1;
+        let cell = &mut self.points[number];
         if let Some(divided) = &mut cell.divided {
             divided.push(point);
             return;
@@ -165,43 +167,71 @@ impl SiteCells {
         take(&points)
     }
 
-    /// Shows `look` the undivided cells that meet an area, and some near it.
-    pub(crate) fn for_each_cell(&self, area: &impl Area, mut look: impl FnMut(&CellSites)) {
-        let _ = self.visit(area, &mut |cell| {
-            look(cell);
+    /// Shows `look` the points in the undivided cells that meet an area, and in some near it.
+    pub(crate) fn for_each_cell(&self, area: &impl Area, mut look: impl FnMut(&[[i32; 3]])) {
+        let _ = self.visit::<false>(area, &mut |points| {
+            look(points);
             ControlFlow::Continue(())
         });
     }
 
-    /// Tells whether `is_wanted` of one of the undivided cells that meet an area, or of some near it.
-    pub(crate) fn is_in_any_cell(&self, area: &impl Area, is_wanted: impl Fn(&CellSites) -> bool) -> bool {
-        let found = self.visit(area, &mut |cell| match is_wanted(cell) {
+    /// Shows `look` those of these points that were added last.
+    pub(crate) fn for_each_grown_cell(&self, area: &impl Area, mut look: impl FnMut(&[[i32; 3]])) {
+        let _ = self.visit::<true>(area, &mut |points| {
+            look(points);
+            ControlFlow::Continue(())
+        });
+    }
+
+    /// Tells whether `is_wanted` of a point that was added last, in a cell that meets an area or is near it.
+    pub(crate) fn has_newly(&self, area: &impl Area, is_wanted: impl Fn(&[i32; 3]) -> bool) -> bool {
+        let found = self.visit::<true>(area, &mut |points| match points.iter().any(&is_wanted) {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         });
         found.is_break()
     }
 
-    fn visit(&self, area: &impl Area, look: &mut impl FnMut(&CellSites) -> ControlFlow<()>) -> ControlFlow<()> {
+    /// Shows `look` the points of cells, only those that were added last if that is asked for.
+    fn visit<const LAST: bool>(
+        &self,
+        area: &impl Area,
+        look: &mut impl FnMut(&[[i32; 3]]) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let side = self.cells.side() as f64;
         for row in self.lines(1, area.across()) {
             let south = (row as f64 + f64::from(self.first[1])) * side;
-            for column in self.lines(0, area.along(south, south + side)) {
-                let cell = &self.points[row * self.columns + column];
+            let of_row = self.lines(0, area.along(south, south + side));
+            let (mut number, end) = (row * self.columns + of_row.start, row * self.columns + of_row.end);
+            while let Some(found) = if LAST { self.grown_from(number) } else { Some(number) }.filter(|n| *n < end) {
+                let cell = &self.points[found];
                 match &cell.divided {
-                    Some(divided) => divided.visit(area, look)?,
-                    None => look(cell)?,
+                    Some(divided) => divided.visit::<LAST>(area, look)?,
+                    None => look(if LAST { cell.newly() } else { &cell.points })?,
                 }
+                number = found + 1;
             }
         }
         ControlFlow::Continue(())
     }
 
-    /// Returns the numbers of the columns (axis 0) or rows (1) from coordinate `low` to `high`.
+    /// Returns the first cell from this one on that has points which were added last.
+    fn grown_from(&self, number: usize) -> Option<usize> {
+        let first = self.is_grown.get(number / 64)? >> (number % 64);
+        if first != 0 {
+            return Some(number + first.trailing_zeros() as usize);
+        }
+        let later = number / 64 + 1;
+        let word = self.is_grown.get(later..)?.iter().position(|word| *word != 0)?;
+        Some((later + word) * 64 + self.is_grown[later + word].trailing_zeros() as usize)
+    }
+
+    /// Returns the numbers of the columns (axis 0) or rows (1) with points from coordinate `low` to `high`.
     fn lines(&self, axis: usize, [low, high]: [f64; 2]) -> Range<usize> {
-        let number = |value: f64| (value / self.cells.side() as f64).floor() - f64::from(self.first[axis]);
+        // Coordinates of points are whole numbers, so it does not matter that these are cut and not rounded down.
+        let number = |value: f64| self.cells.line(value as i64).saturating_sub(i64::from(self.first[axis]));
         let count = if axis == 0 { self.columns } else { self.rows };
-        let (from, to) = (number(low).max(0.0), number(high).min(count as f64 - 1.0));
+        let (from, to) = (number(low).max(0), number(high).min(count as i64 - 1));
         if from > to { 0..0 } else { from as usize..to as usize + 1 }
     }
 }

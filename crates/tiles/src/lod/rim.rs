@@ -30,7 +30,8 @@ impl ShownMesh {
 }
 
 /// Returns the triangles of `filling` that `covers` tells of, with a border that is raised by what the `outline` of the terrain at `positions` is
-/// above them. Skirts reach below the outline by [`SPARE`] times the `mean_error` in steps of z, or as far as the ground may fall to the border.
+/// above them, and other vertices of the outline likewise. Skirts reach below the outline by [`SPARE`] times the `mean_error` in steps of z, or as
+/// far as the ground may fall to the border.
 /// `areas` are those of [`samples`]. `may_move` tells which vertices of the terrain are no parts of lines.
 pub(crate) fn shown(
     (positions, areas): (&[[i32; 3]], &[f64]),
@@ -50,14 +51,19 @@ pub(crate) fn shown(
         filling.positions.iter().zip(&reaches).map(|(p, reach)| reach.around(p[2], spare, deepest)).collect();
     let before: Vec<f64> = filling.positions.iter().map(|p| f64::from(p[2])).collect();
     let mut fitted = before.clone();
-    let mut is_on_border = vec![false; fitted.len()];
+    let mut is_raised = vec![false; fitted.len()];
     for &[site, _] in &border.edges {
         fitted[site as usize] = f64::from(heights[site as usize][1]);
-        is_on_border[site as usize] = true;
+        is_raised[site as usize] = true;
     }
-    let moves = beside(filling, &is_on_border, |site| may_move(filling.vertices[site as usize]));
-    let may_change: Vec<bool> =
-        moves.iter().zip(&is_on_border).map(|(moves, is_on_border)| moves | is_on_border).collect();
+    // Vertices of the outline may lie just inside the border, and no neighbour's ground may be above those either.
+    for (site, &v) in filling.vertices.iter().enumerate() {
+        if outline.on[v as usize] && !std::mem::replace(&mut is_raised[site], true) {
+            fitted[site] = fitted[site].max(f64::from(positions[v as usize][2]));
+        }
+    }
+    let moves = beside(filling, &is_raised, |site| may_move(filling.vertices[site as usize]));
+    let may_change: Vec<bool> = moves.iter().zip(&is_raised).map(|(moves, is_raised)| moves | is_raised).collect();
     let samples = samples((positions, areas), &may_change, filling, places);
     for _ in 0..ROUNDS {
         improve(&samples, &moves, &mut fitted)?;
@@ -66,9 +72,9 @@ pub(crate) fn shown(
     for ((height, before), _) in fitted.iter_mut().zip(&before).zip(&moves).filter(|(_, moves)| **moves) {
         *height = height.clamp(before - most, before + most);
     }
-    let is_inner = |site: usize| !is_on_border[site] && may_move(filling.vertices[site]);
+    let is_inner = |site: usize| !is_raised[site] && may_move(filling.vertices[site]);
     let changes: Vec<f64> = fitted.iter().zip(&before).map(|(after, before)| after - before).collect();
-    let sunk = sinking(&samples, areas, &changes, &is_on_border).clamp(-most, most).round() as i32;
+    let sunk = sinking(&samples, areas, &changes, &is_raised).clamp(-most, most).round() as i32;
     for (site, height) in fitted.into_iter().enumerate() {
         if let Some(position) = mesh.positions.get_mut(number[site] as usize) {
             position[2] = height.round() as i32 - if is_inner(site) { sunk } else { 0 };
@@ -97,20 +103,20 @@ const DEEPEST: f64 = 3.0;
 /// How often the heights beside the border move after it was raised.
 const ROUNDS: usize = 2;
 
-/// Returns by how much sites that are not on the border must go down, so that the mean height over the ground is what it was before the
+/// Returns by how much sites that are not raised must go down, so that the mean height over the ground is what it was before the
 /// heights of the sites had these `changes`. `samples` are those in triangles where a site has one, `areas` those of the whole terrain.
-fn sinking(samples: &[Sample], areas: &[f64], changes: &[f64], is_on_border: &[bool]) -> f64 {
-    let of_border: Vec<f64> = is_on_border.iter().map(|&is_on_border| f64::from(u8::from(is_on_border))).collect();
-    let inner = areas.iter().sum::<f64>() - volume(samples, &of_border);
+fn sinking(samples: &[Sample], areas: &[f64], changes: &[f64], is_raised: &[bool]) -> f64 {
+    let of_raised: Vec<f64> = is_raised.iter().map(|&is_raised| f64::from(u8::from(is_raised))).collect();
+    let inner = areas.iter().sum::<f64>() - volume(samples, &of_raised);
     if inner > 0.0 { volume(samples, changes) / inner } else { 0.0 }
 }
 
-/// Tells for each site of `filling` whether it may move, and shares a triangle with one on the border without being on it.
-fn beside(filling: &Filling, is_on_border: &[bool], may_move: impl Fn(u32) -> bool) -> Vec<bool> {
-    let mut beside = vec![false; is_on_border.len()];
+/// Tells for each site of `filling` whether it may move, and shares a triangle with one that is raised without being that.
+fn beside(filling: &Filling, is_raised: &[bool], may_move: impl Fn(u32) -> bool) -> Vec<bool> {
+    let mut beside = vec![false; is_raised.len()];
     for corners in (0..filling.triangles()).map(|triangle| filling.corners(triangle)) {
-        if corners.iter().any(|&site| is_on_border[site as usize]) {
-            let inner = corners.into_iter().filter(|&site| !is_on_border[site as usize] && may_move(site));
+        if corners.iter().any(|&site| is_raised[site as usize]) {
+            let inner = corners.into_iter().filter(|&site| !is_raised[site as usize] && may_move(site));
             inner.for_each(|site| beside[site as usize] = true);
         }
     }

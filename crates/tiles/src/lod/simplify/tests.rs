@@ -254,6 +254,19 @@ fn skirts_hang_below_the_whole_border() {
     }
 }
 
+/// A neighbour may show the outline as it is. Where one of its vertices lies just inside the border, the surface must not be below it either.
+#[test]
+fn vertices_of_the_outline_inside_the_border_are_not_lowered() {
+    let tile = ragged(64, &[([300, 260], 90)], |x, y| (x.wrapping_mul(31) ^ y.wrapping_mul(17)) % 23);
+    let surface = simplified(&tile, tile.triangles.len() / 6, None).surface;
+    let ends = |tile: &Tile| outline(tile).into_iter().map(|edge| edge[0]).collect::<HashSet<_>>();
+    let border: HashSet<[i32; 2]> = ends(&surface).into_iter().map(|[x, y, _]| [x, y]).collect();
+    let exact = ends(&tile);
+    let inside = surface.positions.iter().filter(|[x, y, _]| !border.contains(&[*x, *y]));
+    let found: Vec<i32> = inside.filter_map(|p| exact.iter().find(|e| e[..2] == p[..2]).map(|e| p[2] - e[2])).collect();
+    assert!(found.len() > 3 && found.iter().all(|above| *above >= 0), "{found:?}");
+}
+
 /// The border is beyond the outline, over ground of neighbours, which may fall away from it as this one does.
 #[test]
 fn skirts_end_below_a_neighbours_slope() {
