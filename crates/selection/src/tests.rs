@@ -245,9 +245,11 @@ proptest! {
         let chosen: BTreeSet<_> = found.iter().copied().collect();
         prop_assert_eq!(worst_points(&points, &chosen, bound), Vec::new());
         // Round by round the plain way.
-        let mut seeds = crate::seeds::Seeds::none(bounds_of(&points), points.len() as u64, [0; 2]);
+        let cells = crate::outline::MarkedCells::none(bounds_of(&points), points.len() as u64, [0; 2]);
+        let mut seeds = crate::seeds::Seeds::none(bounds_of(&points), points.len() as u64, [0; 2], &cells);
         seeds.add(&points, &[]);
-        prop_assert_eq!(found, plain_rounds(&points, seeds.into_points(), bound));
+        let bays = seeds.bays(cells);
+        prop_assert_eq!(found, plain_rounds(&points, seeds.into_points(&bays), bound));
     }
 }
 
