@@ -21,7 +21,7 @@ use std::cmp::Reverse;
 const SELECTED: u32 = u32::MAX - 1;
 
 /// If more than one selected point for so many is new, all are triangulated anew.
-const SITES_PER_INSERTED: usize = 5;
+const SITES_PER_INSERTED: usize = 3;
 
 /// Points that are to be placed are loaded so many at a time: the processor waits for all of them at once.
 const LOADED_AT_ONCE: usize = 64;
