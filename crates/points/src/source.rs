@@ -70,7 +70,7 @@ impl FileFormat {
         }
     }
 
-    /// Tells whether it has no header: bounds, classes and returns are known from the columns and the rows alone.
+    /// Tells whether it is a table as text. Then its rows alone tell the bounds of the points, and its columns what they have.
     pub fn is_text(self) -> bool {
         match self {
             FileFormat::Text => true,

@@ -55,7 +55,11 @@ impl MarkedCells {
         for cell in self.all() {
             let square = [0, 1, 2, 3].map(|corner| [cell[0] + corner % 2, cell[1] + corner / 2]);
             if square.iter().all(|cell| outside.has(*cell)) {
-                square.into_iter().filter(|cell| self.is_in_hull(*cell, &hull)).for_each(|cell| _ = bays.mark(cell));
+                for cell in square {
+                    if !bays.has(cell) && self.is_in_hull(cell, &hull) {
+                        bays.mark(cell);
+                    }
+                }
             }
         }
         bays
@@ -88,7 +92,7 @@ impl MarkedCells {
     /// Returns the number of a cell; `None` if it is too far from the box.
     fn number(&self, cell: [i32; 2]) -> Option<usize> {
         let [column, row] = [0, 1].map(|axis| (cell[axis] - self.first[axis]) as usize);
-        (column < self.count[0] && row < self.count[1]).then_some(row * self.count[0] + column)
+        (column < self.count[0] && row < self.count[1]).then(|| row * self.count[0] + column)
     }
 
     fn has(&self, cell: [i32; 2]) -> bool {

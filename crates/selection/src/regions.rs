@@ -34,15 +34,16 @@ impl RegionSizes {
 
 /// A cloud in regions.
 pub(crate) struct Division<'a, E> {
-    /// Its bays.
-    pub(crate) bays: MarkedCells,
+    /// Its bays, if they were looked for.
+    pub(crate) bays: Option<MarkedCells>,
     /// What is known of all blocks of the cloud.
     pub(crate) blocks: Vec<BlockState>,
     /// The regions that have points.
     pub(crate) regions: Vec<Region<'a, E>>,
 }
 
-/// Divides a cloud, which has `points` points in `bounds`, and looks for its bays. Points of its blocks that are in `memory` do not stay there.
+/// Divides a cloud, which has `points` points in `bounds`. Points of its blocks that are in `memory` do not stay there. Looks for bays if there are
+/// `cells_of_bays`, none of which is marked.
 ///
 /// # Errors
 /// Those of `source`.
@@ -53,18 +54,22 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
     bounds: Bounds<2>,
     points: u64,
     sizes: RegionSizes,
+    cells_of_bays: Option<MarkedCells>,
 ) -> Result<Division<'a, E>, E> {
     let cells = LatticeCells::new(bounds, points, sizes.points, source.offset());
-    let marked = Mutex::new((MarkedCells::none(bounds, points, source.offset()), Vec::new()));
+    let marked = cells_of_bays.map(|cells| Mutex::new((cells, Vec::new())));
     let share = |(number, mut state): (usize, BlockState)| {
         let points = state.take_points(source, memory, number)?;
         let mut shares = BTreeMap::<[i32; 2], Bounds<2>>::new();
         for &[x, y, _] in &points {
             shares.entry(cells.of(x, y)).or_insert(Bounds::of_point([x, y])).include([x, y]);
         }
-        let (marked, hull) = &mut *marked.lock().unwrap_or_else(PoisonError::into_inner);
-        marked.add(&points);
-        *hull = hull_corners([std::mem::take(hull), hull_corners(points)].concat());
+        if let Some(marked) = &marked {
+            let corners = hull_corners(points.clone());
+            let (marked, hull) = &mut *marked.lock().unwrap_or_else(PoisonError::into_inner);
+            marked.add(&points);
+            *hull = hull_corners([std::mem::take(hull), corners].concat());
+        }
         Ok((state, shares))
     };
     let found = blocks.into_par_iter().enumerate().with_max_len(1).map(share).collect::<Result<Vec<_>, E>>()?;
@@ -79,8 +84,11 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
         }
     }
     let region = |(cell, (bounds, blocks))| Region { source, cells, cell, blocks, bounds, taken: 0 };
-    let (marked, hull) = marked.into_inner().unwrap_or_else(PoisonError::into_inner);
-    Ok(Division { bays: marked.bays(&hull), blocks, regions: regions.into_iter().map(region).collect() })
+    let bays = marked.map(|marked| {
+        let (marked, hull) = marked.into_inner().unwrap_or_else(PoisonError::into_inner);
+        marked.bays(&hull)
+    });
+    Ok(Division { bays, blocks, regions: regions.into_iter().map(region).collect() })
 }
 
 /// The points of a cloud that lie in a cell of the lattice.

@@ -39,19 +39,27 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
         let cells = MarkedCells::none(bounds, points, source.offset());
         let none = Seeds::none(bounds, points, source.offset(), bays.unwrap_or(&cells));
         let seeds = seeds_of(source, &blocks, none)?;
-        let bays = bays.cloned().unwrap_or_else(|| seeds.bays(cells));
+        let own;
+        let bays = match bays {
+            Some(bays) => bays,
+            None => {
+                own = seeds.bays(cells);
+                &own
+            }
+        };
         let hull = seeds.hull().to_vec();
         let mut rounds = Rounds::new(source, blocks, bounds, memory);
-        rounds.add(seeds.into_points(&bays))?;
+        rounds.add(seeds.into_points(bays))?;
         return rounds.run(hull, 0, bound, Sample::ladder(source.offset()));
     }
-    let Division { bays: own, blocks, regions } = divide(source, blocks, &memory, bounds, points, sizes)?;
-    let bays = bays.unwrap_or(&own);
+    let cells = bays.is_none().then(|| MarkedCells::none(bounds, points, source.offset()));
+    let Division { bays: own, blocks, regions } = divide(source, blocks, &memory, bounds, points, sizes, cells)?;
+    let bays = bays.or(own.as_ref());
     let mut rounds = Rounds::new(source, blocks, bounds, memory);
     let (mut corners, mut most) = (Vec::new(), 0);
     for region in &regions {
         let region = region.after(rounds.selected_bytes());
-        let of_region = select_by_regions(&region, bound, sizes, Some(bays))?;
+        let of_region = select_by_regions(&region, bound, sizes, bays)?;
         most = most.max(of_region.figures.rounds);
         let selected = of_region.sites.within(region.bounds)?;
         corners.extend(hull_corners(selected.clone()));

@@ -203,7 +203,9 @@ impl SiteCells {
             let south = (row as f64 + f64::from(self.first[1])) * side;
             let of_row = self.lines(0, area.along(south, south + side));
             let (mut number, end) = (row * self.columns + of_row.start, row * self.columns + of_row.end);
-            while let Some(found) = if LAST { self.grown_from(number) } else { Some(number) }.filter(|n| *n < end) {
+            while let Some(found) =
+                if LAST { self.grown(number..end) } else { Some(number) }.filter(|found| *found < end)
+            {
                 let cell = &self.points[found];
                 match &cell.divided {
                     Some(divided) => divided.visit::<LAST>(area, look)?,
@@ -215,18 +217,18 @@ impl SiteCells {
         ControlFlow::Continue(())
     }
 
-    /// Returns the first cell from this one on that has points which were added last.
-    fn grown_from(&self, number: usize) -> Option<usize> {
-        let first = self.is_grown.get(number / 64)? >> (number % 64);
-        if first != 0 {
-            return Some(number + first.trailing_zeros() as usize);
+    /// Returns the first of these cells, or one of the next 63, that has points which were added last.
+    fn grown(&self, cells: Range<usize>) -> Option<usize> {
+        let mut word = cells.start / 64;
+        let mut marks = self.is_grown.get(word)? >> (cells.start % 64) << (cells.start % 64);
+        while marks == 0 {
+            word += 1;
+            marks = *self.is_grown.get(word).filter(|_| word * 64 < cells.end)?;
         }
-        let later = number / 64 + 1;
-        let word = self.is_grown.get(later..)?.iter().position(|word| *word != 0)?;
-        Some((later + word) * 64 + self.is_grown[later + word].trailing_zeros() as usize)
+        Some(word * 64 + marks.trailing_zeros() as usize)
     }
 
-    /// Returns the numbers of the columns (axis 0) or rows (1) with points from coordinate `low` to `high`.
+    /// Returns the numbers of the columns (axis 0) or rows (1) that may have points from coordinate `low` to `high`.
     fn lines(&self, axis: usize, [low, high]: [f64; 2]) -> Range<usize> {
         // Coordinates of points are whole numbers, so it does not matter that these are cut and not rounded down.
         let number = |value: f64| self.cells.line(value as i64).saturating_sub(i64::from(self.first[axis]));
@@ -239,6 +241,37 @@ impl SiteCells {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Most cells have no new point, and those that have some are far from each other.
+    #[test]
+    fn new_points_are_found_wherever_they_are() {
+        let bounds = Bounds { min: [-20_000; 2], max: [20_000; 2] };
+        let mut cells = SiteCells::none(bounds, 1_000_000);
+        assert!(cells.columns > 20 && cells.points.len() > 500);
+        let newly = |cells: &SiteCells, area: Bounds<2>| {
+            let mut found = Vec::new();
+            cells.for_each_grown_cell(&area, |points| found.extend_from_slice(points));
+            found.sort_unstable();
+            found
+        };
+        for round in 0..40 {
+            cells.settle();
+            let added: Vec<[i32; 3]> = (0..3)
+                .map(|i| [(round * 7_919 + i * 13_003) % 20_000, (round * 3_001 + i * 9_973) % 40_000 - 20_000, i])
+                .collect();
+            cells.add(added.iter().copied());
+            let mut expected = added.clone();
+            expected.sort_unstable();
+            assert_eq!(newly(&cells, bounds), expected);
+            for point in added {
+                let around = Bounds { min: [point[0] - 9_000, point[1]], max: [point[0], point[1] + 9_000] };
+                assert!(newly(&cells, around).contains(&point));
+                assert!(cells.has_newly(&around, |p| *p == point));
+            }
+        }
+        cells.settle();
+        assert_eq!(newly(&cells, bounds), [[0; 3]; 0]);
+    }
 
     #[test]
     fn crowded_cells_are_divided() {

@@ -394,17 +394,18 @@ fn regions_depend_on_the_points_alone() {
     }
 }
 
-/// A region in which the shore of a bay is straight has points along it too.
+/// The shores of a bay that is none of a single region have points too.
 #[test]
 fn bays_are_those_of_the_whole_cloud() {
-    let all = (0..256).flat_map(|y| (0..256).map(move |x| [x, y, 7]));
-    let points: Vec<[i32; 3]> = all.filter(|[x, y, _]| *x < 70 || *y < 70).collect();
-    let sizes = crate::regions::RegionSizes { undivided: 16_000, points: 1_000 };
+    // An L, with dents in the shores of the bay between its arms that are narrower than a cell.
+    let shore = |along: i32| if along % 128 < 64 { 200 } else { 180 };
+    let all = (0..600).flat_map(|y| (0..600).map(move |x| [x, y, 7]));
+    let points: Vec<[i32; 3]> = all.filter(|[x, y, _]| *x < shore(*y) || *y < shore(*x)).collect();
+    let sizes = crate::regions::RegionSizes { undivided: 160_000, points: 10_000 };
     let cloud = Cloud::new(&points, &[], 90, AMPLE);
     let found = crate::select::select_by_regions(&cloud, ErrorBound::new(1, 1), sizes, None).unwrap();
     let found = found.sites.within(bounds_of(&points)).unwrap();
-    let along = |rows: std::ops::Range<i32>| found.iter().filter(|[x, y, _]| *x == 69 && rows.contains(y)).count();
-    // A cell is 64 steps wide.
-    assert!(along(128..192) > 0 && along(192..256) > 0, "{found:?}");
-    assert!(found.len() < 60, "{}", found.len());
+    // A cell is 32 steps wide, a region 256. These are no corners of any hull.
+    assert!(found.contains(&[179, 320, 7]) && found.contains(&[352, 179, 7]), "{found:?}");
+    assert!(found.len() < 100, "{}", found.len());
 }

@@ -30,9 +30,8 @@ impl ShownMesh {
 }
 
 /// Returns the triangles of `filling` that `covers` tells of, with a border that is raised by what the `outline` of the terrain at `positions` is
-/// above them, and other vertices of the outline likewise. Skirts reach below the outline by [`SPARE`] times the `mean_error` in steps of z, or as
-/// far as the ground may fall to the border.
-/// `areas` are those of [`samples`]. `may_move` tells which vertices of the terrain are no parts of lines.
+/// above them. Other vertices of the outline have their own height at least. Skirts reach below the outline by [`SPARE`] times the `mean_error` in
+/// steps of z, or as far as the ground may fall to the border. `areas` are those of [`samples`]. `may_move` tells which vertices of the terrain are no parts of lines.
 pub(crate) fn shown(
     (positions, areas): (&[[i32; 3]], &[f64]),
     outline: &Outline,
