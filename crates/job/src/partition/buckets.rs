@@ -21,7 +21,7 @@ pub struct Bucket {
 
 /// Smaller blocks cost more system calls than their memory is worth, and more bytes, because points are packed in groups of 256.
 const LEAST_BLOCK: u64 = 64;
-/// Twice as large ones take a quarter to a third more memory for the whole job, and at most a hundredth less time.
+/// Blocks of twice this size cost the whole job a quarter to two fifths more memory, and save at most a hundredth of the time.
 const LARGEST_BLOCK: u64 = 1024;
 /// Points are packed in pieces of this many, so that a block of whole pieces is not padded.
 const PIECE: u64 = 32;

@@ -110,7 +110,7 @@ fn sinking(samples: &[Sample], areas: &[f64], changes: &[f64], is_raised: &[bool
     if inner > 0.0 { volume(samples, changes) / inner } else { 0.0 }
 }
 
-/// Tells for each site of `filling` whether it may move, and shares a triangle with one that is raised without being that.
+/// Tells for each site of `filling` whether it may move and is not raised, but shares a triangle with one that is.
 fn beside(filling: &Filling, is_raised: &[bool], may_move: impl Fn(u32) -> bool) -> Vec<bool> {
     let mut beside = vec![false; is_raised.len()];
     for corners in (0..filling.triangles()).map(|triangle| filling.corners(triangle)) {
