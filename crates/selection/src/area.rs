@@ -44,3 +44,8 @@ impl Area for Disc {
 pub(crate) fn is_in(bounds: &Bounds<2>, point: &[i32; 3]) -> bool {
     (0..2).all(|k| bounds.min[k] <= point[k] && point[k] <= bounds.max[k])
 }
+
+/// Returns the area of a box in square lattice steps, with half a step around it.
+pub(crate) fn area_of(bounds: Bounds<2>) -> f64 {
+    (bounds.extent(0) + 1) as f64 * (bounds.extent(1) + 1) as f64
+}

@@ -2,8 +2,9 @@
 
 use crate::area::is_in;
 use crate::column::Column;
+use crate::concern::Concern;
 use crate::disc::Disc;
-use crate::error_bound::{Candidate, ErrorBound, VerticalError};
+use crate::error_bound::{Candidate, ErrorBound, RoundBound, VerticalError};
 use crate::held_points::HeldPoints;
 use crate::mesh_of_points::{Held, MeshOfPoints, NONE, TriangleKey};
 use crate::near_points::{NearestTriangles, PointsByPlace};
@@ -197,10 +198,11 @@ impl Block {
         Ok(block)
     }
 
-    /// Returns the box in which points must be selected before the block has anything to propose again; `None` if it has now. The block has
-    /// proposed what it has.
-    pub(crate) fn settled_within(&self) -> Option<Bounds<2>> {
-        (self.mesh.exceeding == 0).then_some(self.reach)
+    /// Returns where points must be selected before the block has anything to propose again; `None` if it has now. The block has proposed what it
+    /// has.
+    pub(crate) fn settled_within(&self) -> Option<Concern> {
+        let disc = |triangle: &u32| Disc::of(self.mesh.corners(*triangle as usize));
+        (self.mesh.exceeding == 0).then(|| Concern::new(self.around, self.at_border.iter().map(disc).collect()))
     }
 
     /// Returns all that it has of points, sites and triangles. No points are displaced between rounds.
@@ -249,17 +251,12 @@ impl Block {
     /// # Errors
     /// Those of `selected`.
     pub(crate) fn update(&mut self, selected: &SelectedSites) -> sys::Result<()> {
-        let mut concerns_border = false;
-        for point in selected.newly_within(self.reach) {
-            if is_in(&self.around, &point) {
-                let start = self.near.of(point);
-                self.insert(point, start);
-            } else {
-                concerns_border = true;
-            }
+        for point in selected.newly_within(self.around) {
+            let start = self.near.of(point);
+            self.insert(point, start);
         }
         self.place_displaced();
-        self.complete(selected, concerns_border)
+        self.complete(selected, selected.has_newly_between(self.around, self.reach))
     }
 
     /// Looks at the points of a sample that holds the present one.
@@ -287,9 +284,9 @@ impl Block {
 
     /// Returns the points of triangles whose distance is more than `bound`.
     pub(crate) fn beyond(&self, bound: ErrorBound) -> Vec<[i32; 3]> {
-        let mut beyond = Vec::new();
+        let (mut beyond, everywhere) = (Vec::new(), RoundBound::everywhere(bound));
         for triangle in 0..self.mesh.held.len() {
-            if self.mesh.excess_over(triangle, bound) == 0 {
+            if self.mesh.excess_over(triangle, &everywhere) == 0 {
                 continue;
             }
             let corners = self.mesh.points(triangle);
@@ -306,8 +303,8 @@ impl Block {
     }
 
     /// Proposes points to select.
-    pub(crate) fn propose(&mut self, bound: ErrorBound) -> Proposal {
-        let far = far_above(bound);
+    pub(crate) fn propose(&mut self, bound: &RoundBound) -> Proposal {
+        let far = far_above(bound.usual);
         for index in 0..self.mesh.changed.len() {
             let t = self.mesh.changed[index] as usize;
             let excess = self.mesh.excess_over(t, bound);
@@ -561,7 +558,7 @@ pub(crate) fn greedy_insertion(mut block: Block, selected: &mut SelectedSites, b
     let mut count = selected.count();
     loop {
         for t in std::mem::take(&mut block.mesh.changed) {
-            let excess = block.mesh.excess_over(t as usize, bound);
+            let excess = block.mesh.excess_over(t as usize, &RoundBound::everywhere(bound));
             if excess > 0 {
                 let worst = block.mesh.held[t as usize].worst;
                 heap.push((excess, Reverse(block.points[worst as usize]), t, worst));

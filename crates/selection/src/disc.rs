@@ -1,6 +1,6 @@
 //! The circumscribed disc of a triangle, in floating point on the safe side.
 
-use delaunay::geometry::predicates::orient2d;
+use delaunay::geometry::predicates::{in_circle, orient2d};
 use delaunay::geometry::{Bounds, Site};
 
 /// A disc that surely holds the circumscribed disc of a triangle.
@@ -65,6 +65,15 @@ impl Disc {
     pub(crate) fn squared_distance_from_centre(&self, point: [i32; 3]) -> f64 {
         let [x, y] = [0, 1].map(|axis| f64::from(point[axis]) - self.centre[axis]);
         x * x + y * y
+    }
+
+    /// Tells whether a point lies inside the circle of the triangle of `corners`, whose disc this is. None of the corners is.
+    #[inline]
+    pub(crate) fn has_inside(&self, corners: [Site; 3], point: [i32; 3]) -> bool {
+        let ([a, b, c], site) = (corners, [point[0], point[1]]);
+        self.squared_distance_from_centre(point) <= self.reach * self.reach
+            && !corners.contains(&site)
+            && in_circle(a, b, c, site)
     }
 
     /// Returns the range of x where the disc meets the stripe of these y.

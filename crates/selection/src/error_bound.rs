@@ -4,6 +4,7 @@ use delaunay::geometry::Site;
 use delaunay::geometry::predicates::orient2d;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
+use std::ops::Range;
 
 /// A bound on vertical distances: a fraction of lattice steps of height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,6 +37,33 @@ impl ErrorBound {
     #[inline]
     pub fn is_exceeded_by(self, error: VerticalError) -> bool {
         error.numerator * u128::from(self.per) > u128::from(self.steps) * u128::from(error.area)
+    }
+}
+
+/// The bound in a round: one for most triangles, and another for those of some areas.
+#[derive(Clone, Debug)]
+pub(crate) struct RoundBound {
+    pub(crate) usual: ErrorBound,
+    other: ErrorBound,
+    /// Twice the areas of triangles with the other bound, in square lattice steps.
+    with_other: Range<u64>,
+}
+
+impl RoundBound {
+    /// Returns one bound for all triangles.
+    pub(crate) fn everywhere(bound: ErrorBound) -> RoundBound {
+        RoundBound { usual: bound, other: bound, with_other: 0..0 }
+    }
+
+    /// Returns the same with another bound for triangles of these areas in square lattice steps.
+    pub(crate) fn but(self, other: ErrorBound, areas: Range<f64>) -> RoundBound {
+        RoundBound { other, with_other: (2.0 * areas.start) as u64..(2.0 * areas.end) as u64, ..self }
+    }
+
+    /// Returns an error in units of [`VerticalError::fixed`], at least 1, if it exceeds the bound for its triangle, else 0.
+    pub(crate) fn excess(&self, error: VerticalError) -> u64 {
+        let bound = if self.with_other.contains(&error.area) { self.other } else { self.usual };
+        if bound.is_exceeded_by(error) { error.fixed().max(1) } else { 0 }
     }
 }
 

@@ -13,6 +13,7 @@
 mod area;
 mod block;
 mod column;
+mod concern;
 mod disc;
 mod error_bound;
 mod held_points;

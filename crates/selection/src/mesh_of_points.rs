@@ -1,7 +1,7 @@
 //! A triangulation that knows the points in its triangles.
 
 use crate::column::Column;
-use crate::error_bound::{ErrorBound, VerticalError};
+use crate::error_bound::{RoundBound, VerticalError};
 use bytemuck::{Pod, Zeroable};
 use delaunay::geometry::Site;
 use delaunay::geometry::predicates::orient2d;
@@ -162,14 +162,13 @@ impl MeshOfPoints {
     }
 
     /// Returns the distance of the worst point of a triangle in units of [`VerticalError::fixed`] if it exceeds the bound, else 0.
-    pub(crate) fn excess_over(&self, triangle: usize, bound: ErrorBound) -> u64 {
+    pub(crate) fn excess_over(&self, triangle: usize, bound: &RoundBound) -> u64 {
         let held = &self.held[triangle];
         if held.worst == NONE {
             return 0;
         }
         let [a, b, c] = self.corners(triangle);
-        let error = VerticalError { numerator: held.numerator(), area: orient2d(a, b, c) as u64 };
-        if bound.is_exceeded_by(error) { error.fixed().max(1) } else { 0 }
+        bound.excess(VerticalError { numerator: held.numerator(), area: orient2d(a, b, c) as u64 })
     }
 
     /// Returns x, y and z of the corners of a triangle.

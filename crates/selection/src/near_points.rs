@@ -1,5 +1,6 @@
 //! Small squares over the points of a block: which points and which triangles are near each other.
 
+use crate::area::area_of;
 use crate::sample::Sample;
 use delaunay::geometry::Bounds;
 use delaunay::geometry::square_grid::SquareGrid;
@@ -35,8 +36,7 @@ impl NearestTriangles {
 
 /// Returns square cells over `bounds` with `wanted` of the points in each.
 fn grid_of(bounds: Bounds<2>, points: usize, wanted: f64) -> SquareGrid {
-    let area = (bounds.extent(0) + 1) as f64 * (bounds.extent(1) + 1) as f64;
-    SquareGrid::new(bounds, (area * wanted / points.max(1) as f64).sqrt().ceil().max(1.0), 4096.0)
+    SquareGrid::new(bounds, (area_of(bounds) * wanted / points.max(1) as f64).sqrt().ceil().max(1.0), 4096.0)
 }
 
 /// The points of a block row by row of small cells, to and fro.

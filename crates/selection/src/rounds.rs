@@ -4,13 +4,15 @@
 //! until the circle of no triangle that holds its points has one ([`crate::block`]). So these triangles are those of the whole triangulation.
 //! A triangle that reaches out of a block may hold points of others: their worst points are compared.
 
+use crate::area::area_of;
 use crate::block::{Block, BlockErrors, Proposal, SharedCandidate, far_above};
-use crate::error_bound::ErrorBound;
+use crate::concern::Concern;
+use crate::error_bound::{ErrorBound, RoundBound};
 use crate::held_points::HeldPoints;
 use crate::memory::BlockMemory;
 use crate::mesh_of_points::TriangleKey;
 use crate::near_points::PointsByPlace;
-use crate::sample::{Sample, bound_of_samples, very_far_above};
+use crate::sample::{Sample, very_far_above};
 use crate::selected_sites::SelectedSites;
 use crate::source::{BYTES_PER_LISTED, BlockPoints, PointSource};
 use crate::swap::{Place, SwapSpace, SwappedBlock};
@@ -62,7 +64,9 @@ pub(crate) struct BlockState {
     /// Its place in the file.
     place: Option<Place>,
     /// If the block has nothing to propose: where points must be selected before that changes.
-    settled: Option<Bounds<2>>,
+    settled: Option<Concern>,
+    /// The distances of its points, if it has nothing to propose and waits nowhere.
+    errors: Option<BlockErrors>,
 }
 
 impl BlockState {
@@ -102,6 +106,8 @@ pub(crate) struct Rounds<'a, E> {
     swap: SwapSpace,
     /// The points that are looked at.
     sample: Sample,
+    /// The area of the box of all points, in square lattice steps.
+    area: f64,
     figures: Figures,
 }
 
@@ -123,6 +129,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             memory,
             swap: SwapSpace::default(),
             sample: Sample::all(source.offset()),
+            area: area_of(bounds),
             figures: Figures { points, ..Figures::default() },
         }
     }
@@ -164,7 +171,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             if number > 0 {
                 self.add_beyond(very_far_above(bound))?;
             }
-            self.down_to(if sample.is_all() { bound } else { bound_of_samples(bound) })?;
+            self.down_to(&sample.bound(bound, self.figures.points, self.area))?;
         }
         self.finish()
     }
@@ -180,13 +187,13 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
     }
 
     /// Does rounds until no point of the sample exceeds `bound`.
-    fn down_to(&mut self, bound: ErrorBound) -> Result<(), E> {
+    fn down_to(&mut self, bound: &RoundBound) -> Result<(), E> {
         loop {
             self.memory.begin_round();
             let proposals =
                 (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|block| self.proposal_of(block, bound));
             let proposals = proposals.collect::<Result<Vec<_>, E>>()?;
-            if !self.add_round(accepted(&proposals, far_above(bound)))? {
+            if !self.add_round(accepted(&proposals, far_above(bound.usual)))? {
                 return Ok(());
             }
         }
@@ -205,18 +212,23 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
     }
 
     /// Returns what a block proposes to select. A block that has nothing to propose is left alone until points are selected near it.
-    fn proposal_of(&self, index: usize, bound: ErrorBound) -> Result<Proposal, E> {
+    fn proposal_of(&self, index: usize, bound: &RoundBound) -> Result<Proposal, E> {
         let mut state = self.blocks[index].lock().unwrap_or_else(PoisonError::into_inner);
-        if state.settled.is_some_and(|reach| !self.selected.has_newly_within(reach)) {
+        if state.settled.as_ref().is_some_and(|concern| !concern.has_newly(&self.selected)) {
             return Ok(Proposal::default());
         }
-        self.with_block(index, &mut state, |block| (block.propose(bound), block.settled_within())).map(
-            |(proposal, settled)| {
-                state.settled = settled;
-                self.memory.note_proposal(proposal.bytes());
-                proposal
-            },
-        )
+        let is_new = state.block.is_none() && state.swapped.is_none();
+        let Some(mut block) = self.block(index, &mut state)? else { return Ok(Proposal::default()) };
+        let proposal = block.propose(bound);
+        self.memory.note_proposal(proposal.bytes());
+        state.settled = block.settled_within();
+        if is_new && self.sample.is_all() && state.settled.is_some() {
+            // It is far from the borders of regions, and hardly needed again.
+            state.errors = Some(self.errors_of(&block));
+        } else {
+            self.put_block(block, &mut state)?;
+        }
+        Ok(proposal)
     }
 
     /// Lends `work` a block that knows all that is selected. Returns a default for a block without points.
@@ -235,6 +247,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
     /// Returns a block that knows all that is selected; `None` for one without points.
     fn block(&self, index: usize, state: &mut BlockState) -> Result<Option<Block>, E> {
         let Some(bounds) = state.bounds else { return Ok(None) };
+        state.errors = None;
         let triangulated = |points, afar: &[[i32; 3]]| {
             let triangulate = |sites: &[Site]| self.source.triangulate(sites);
             Block::new(points, bounds, self.sample, &self.selected, afar, triangulate)
@@ -289,15 +302,21 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         Ok(())
     }
 
+    /// Returns the distances of the points of a block.
+    fn errors_of(&self, block: &Block) -> BlockErrors {
+        block.errors(|corners| self.source.asks_about(corners))
+    }
+
     fn finish(mut self) -> Result<Selection<'a>, E> {
         let errors = (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|index| {
             let mut state = self.blocks[index].lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(errors) = state.errors.take() {
+                return Ok::<_, E>(errors);
+            }
             let block = self.block(index, &mut state)?;
             // Nothing needs it any more.
             self.free_place(&mut state)?;
-            Ok::<_, E>(
-                block.map_or(BlockErrors::default(), |block| block.errors(|corners| self.source.asks_about(corners))),
-            )
+            Ok(block.map_or(BlockErrors::default(), |block| self.errors_of(&block)))
         });
         let errors: BlockErrors = errors.try_reduce(BlockErrors::default, |a, b| Ok(a.join(b)))?;
         let steps = (1u64 << crate::VerticalError::FRACTION_BITS) as f64;

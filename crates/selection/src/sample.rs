@@ -1,6 +1,6 @@
 //! Samples of a cloud, each a part of the next.
 
-use crate::error_bound::ErrorBound;
+use crate::error_bound::{ErrorBound, RoundBound};
 
 /// Some of the points of a cloud: one of so many, chosen by a hash of the place.
 ///
@@ -36,6 +36,21 @@ impl Sample {
         (0..=steps).rev().map(move |step| Sample { halvings: step * Sample::STEP, offset })
     }
 
+    /// Returns the bound for rounds over the sample of a cloud that has `points` points on an `area` in square lattice steps.
+    ///
+    /// For most triangles it is four times the bound of all points. If it were that, some percent of the vertices would be superfluous in the end:
+    /// among all points there are worse ones. But large triangles have enough points of the sample, at least sixteen of the largest one and
+    /// thirty-two of the one before it, and it is in them that points are placed most often. Those sixteen times as large are few, and each
+    /// of their vertices matters.
+    pub(crate) fn bound(self, bound: ErrorBound, points: u64, area: f64) -> RoundBound {
+        if self.is_all() {
+            return RoundBound::everywhere(bound);
+        }
+        let points_of_large = 8u64 << (3 * self.halvings / 2);
+        let large = points_of_large as f64 * (area / points.max(1) as f64);
+        RoundBound::everywhere(bound.times(4)).but(bound, large..16.0 * large)
+    }
+
     /// Tells whether it has a point.
     #[inline]
     pub(crate) fn has(self, [x, y, _]: [i32; 3]) -> bool {
@@ -51,12 +66,7 @@ impl Sample {
     }
 }
 
-/// Returns the bound for samples. If it were that of all points, some percent of the vertices would be superfluous in the end.
-pub(crate) fn bound_of_samples(bound: ErrorBound) -> ErrorBound {
-    bound.times(4)
-}
-
-/// Returns the distance above which all points of a sample are selected at once. A quarter of the sample is within [`bound_of_samples`] of the
+/// Returns the distance above which all points of a sample are selected at once. A quarter of the sample is within four times the bound of the
 /// mesh by then, so where another point is so far away, the ground is rough, and nearly all points are needed.
 pub(crate) fn very_far_above(bound: ErrorBound) -> ErrorBound {
     bound.times(16)
@@ -65,6 +75,7 @@ pub(crate) fn very_far_above(bound: ErrorBound) -> ErrorBound {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error_bound::VerticalError;
 
     #[test]
     fn a_sample_is_a_part_of_the_next_wherever_the_lattice_begins() {
@@ -81,5 +92,20 @@ mod tests {
         assert_eq!(samples.last().map(Vec::len), Some(points.len()));
         let moved: Vec<Vec<usize>> = Sample::ladder([777, 0]).map(|sample| of(sample, 777)).collect();
         assert_eq!(moved, samples);
+    }
+
+    #[test]
+    fn large_triangles_have_the_bound_of_all_points_in_samples() {
+        let bound = ErrorBound::new(10, 1);
+        // Beyond the bound, but not beyond four times it. Each point has 10 square steps; 64 points take twice the area of 1280.
+        let exceeds = |sample: Sample, area: u64| {
+            let error = VerticalError { numerator: 20 * u128::from(area), area };
+            sample.bound(bound, 1000, 10_000.0).excess(error) > 0
+        };
+        let [first, last, all] = Sample::ladder([0; 2]).collect::<Vec<_>>().try_into().unwrap();
+        let areas = [1279, 1280, 20_479, 20_480];
+        assert_eq!(areas.map(|area| exceeds(last, area)), [false, true, true, false]);
+        assert_eq!(areas.map(|area| exceeds(first, 8 * area)), [false, true, true, false]);
+        assert!(areas.iter().all(|&area| exceeds(all, area)));
     }
 }

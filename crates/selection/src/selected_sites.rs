@@ -5,7 +5,6 @@ use crate::disc::Disc;
 use crate::site_cells::SiteCells;
 use crate::source::SelectionStore;
 use crate::stored_sites::StoredSites;
-use delaunay::geometry::predicates::in_circle;
 use delaunay::geometry::{Bounds, Site};
 use sys::Result;
 
@@ -105,22 +104,22 @@ impl<'a> SelectedSites<'a> {
         self.cells.has_newly(&bounds, |point| is_in(&bounds, point))
     }
 
+    /// Tells whether one of the points that were added last lies in `outer`, but not in `inner`.
+    pub(crate) fn has_newly_between(&self, inner: Bounds<2>, outer: Bounds<2>) -> bool {
+        self.cells.has_newly(&outer, |point| is_in(&outer, point) && !is_in(&inner, point))
+    }
+
     /// Returns the point that lies deepest inside the circle of the triangle of `corners`, which is `disc`, or `None` if there is none. None of
     /// the corners is looked at.
     ///
     /// # Errors
     /// [`sys::Error::Io`] on the file of those that are not in memory.
     pub(crate) fn deepest_inside(&self, corners: [Site; 3], disc: Disc) -> Result<Option<[i32; 3]>> {
-        let [a, b, c] = corners;
         let mut deepest: Option<(f64, [i32; 3])> = None;
         self.visit(&disc, |points| {
             for &point in points {
-                let (site, from_centre) = ([point[0], point[1]], disc.squared_distance_from_centre(point));
-                if from_centre <= disc.reach * disc.reach
-                    && deepest.is_none_or(|(least, _)| from_centre < least)
-                    && !corners.contains(&site)
-                    && in_circle(a, b, c, site)
-                {
+                let from_centre = disc.squared_distance_from_centre(point);
+                if deepest.is_none_or(|(least, _)| from_centre < least) && disc.has_inside(corners, point) {
                     deepest = Some((from_centre, point));
                 }
             }
@@ -128,10 +127,15 @@ impl<'a> SelectedSites<'a> {
         Ok(deepest.map(|(_, point)| point))
     }
 
+    /// Tells whether one of the points that were added last lies in a disc, but for rounding.
+    pub(crate) fn has_newly_near(&self, disc: &Disc) -> bool {
+        let most = disc.reach * disc.reach;
+        self.cells.has_newly(disc, |point| disc.squared_distance_from_centre(*point) <= most)
+    }
+
     /// Tells whether one of the points that were added last lies inside the circle of the triangle of `corners`, which is `disc`.
     pub(crate) fn has_newly_inside(&self, corners: [Site; 3], disc: Disc) -> bool {
-        let [a, b, c] = corners;
-        self.cells.has_newly(&disc, |&[x, y, _]| !corners.contains(&[x, y]) && in_circle(a, b, c, [x, y]))
+        self.cells.has_newly(&disc, |&point| disc.has_inside(corners, point))
     }
 
     /// Shows `look` all points in an area, and some near it.
@@ -146,6 +150,7 @@ impl<'a> SelectedSites<'a> {
 mod tests {
     use super::*;
     use crate::tests::Waiting;
+    use delaunay::geometry::predicates::in_circle;
     use std::collections::BTreeSet;
 
     /// Those in cells that are divided, and those that wait in a file.

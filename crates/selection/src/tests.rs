@@ -1,6 +1,7 @@
 //! Selections compared with the plainest way to them.
 
-use crate::sample::{Sample, bound_of_samples, very_far_above};
+use crate::error_bound::RoundBound;
+use crate::sample::{Sample, very_far_above};
 use crate::*;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
@@ -141,13 +142,14 @@ fn holds_the_others(selected: &BTreeSet<[i32; 3]>, points: &[[i32; 3]], holding:
 /// Does rounds on all points of one sample after the other at once, each from nothing, from these seeds on.
 fn plain_rounds(points: &[[i32; 3]], seeds: Vec<[i32; 3]>, bound: ErrorBound) -> Vec<[i32; 3]> {
     let mut selected: BTreeSet<[i32; 3]> = seeds.into_iter().collect();
+    let (count, area) = (points.len() as u64, crate::area::area_of(bounds_of(points)));
     for (number, sample) in Sample::ladder([0; 2]).enumerate() {
         let points: Vec<[i32; 3]> = points.iter().copied().filter(|&p| sample.has(p)).collect();
         if number > 0 {
             let beyond = beyond(&points, &selected, very_far_above(bound));
             selected.extend(beyond);
         }
-        rounds_over(&points, &mut selected, if sample.is_all() { bound } else { bound_of_samples(bound) });
+        rounds_over(&points, &mut selected, &sample.bound(bound, count, area));
     }
     selected.into_iter().collect()
 }
@@ -165,7 +167,7 @@ fn triangles_of(selected: &BTreeSet<[i32; 3]>) -> Vec<[[i32; 3]; 3]> {
     canonical(&sites).unwrap().corners().iter().map(|t| t.map(|v| all[v as usize])).collect()
 }
 
-fn rounds_over(points: &[[i32; 3]], selected: &mut BTreeSet<[i32; 3]>, bound: ErrorBound) {
+fn rounds_over(points: &[[i32; 3]], selected: &mut BTreeSet<[i32; 3]>, bound: &RoundBound) {
     loop {
         let worst = worst_points(points, selected, bound);
         let beside = |a: &[[i32; 3]; 3], b: &[[i32; 3]; 3]| a.iter().filter(|corner| b.contains(corner)).count() == 2;
@@ -173,7 +175,7 @@ fn rounds_over(points: &[[i32; 3]], selected: &mut BTreeSet<[i32; 3]>, bound: Er
         let accepted = worst.iter().filter(|(triangle, own)| {
             let is_outdone_by =
                 |(other, candidate): &WorstPoint| beside(triangle, other) && rank(*candidate) > rank(*own);
-            own.0 > 4 * bound.fixed() || !worst.iter().any(is_outdone_by)
+            own.0 > 4 * bound.usual.fixed() || !worst.iter().any(is_outdone_by)
         });
         let accepted: Vec<[i32; 3]> = accepted.map(|(_, (_, p))| *p).collect();
         if accepted.is_empty() {
@@ -187,12 +189,12 @@ fn rounds_over(points: &[[i32; 3]], selected: &mut BTreeSet<[i32; 3]>, bound: Er
 type WorstPoint = ([[i32; 3]; 3], (u64, [i32; 3]));
 
 /// Returns the worst point of each triangle where it exceeds the bound.
-fn worst_points(points: &[[i32; 3]], selected: &BTreeSet<[i32; 3]>, bound: ErrorBound) -> Vec<WorstPoint> {
+fn worst_points(points: &[[i32; 3]], selected: &BTreeSet<[i32; 3]>, bound: &RoundBound) -> Vec<WorstPoint> {
     let worst = triangles_of(selected).into_iter().filter_map(|triangle| {
         let candidates = points.iter().filter(|p| !selected.contains(*p) && owns(triangle, **p));
         let worst = candidates.map(|&p| (VerticalError::of(triangle, p), p));
         let worst = worst.max_by_key(|(error, p)| (error.numerator, std::cmp::Reverse(*p)));
-        worst.filter(|(error, _)| bound.is_exceeded_by(*error)).map(|(error, p)| (triangle, (error.fixed().max(1), p)))
+        worst.map(|(error, p)| (triangle, (bound.excess(error), p))).filter(|(_, (excess, _))| *excess > 0)
     });
     worst.collect()
 }
@@ -243,7 +245,7 @@ proptest! {
         prop_assert_eq!(found.len() as u64, figures.selected);
         // Every point is within the bound.
         let chosen: BTreeSet<_> = found.iter().copied().collect();
-        prop_assert_eq!(worst_points(&points, &chosen, bound), Vec::new());
+        prop_assert_eq!(worst_points(&points, &chosen, &RoundBound::everywhere(bound)), Vec::new());
         // Round by round the plain way.
         let cells = crate::outline::MarkedCells::none(bounds_of(&points), points.len() as u64, [0; 2]);
         let mut seeds = crate::seeds::Seeds::none(bounds_of(&points), points.len() as u64, [0; 2], &cells);
@@ -388,7 +390,7 @@ fn regions_depend_on_the_points_alone() {
             assert_eq!(run(side, memory, offset), (found.clone(), figures), "blocks of {side}, {offset:?}");
         }
         let chosen: BTreeSet<_> = found.iter().copied().collect();
-        assert_eq!(worst_points(&points, &chosen, bound), Vec::new());
+        assert_eq!(worst_points(&points, &chosen, &RoundBound::everywhere(bound)), Vec::new());
         assert!(points[700..702].iter().all(|point| chosen.contains(point)));
         assert!(figures.greatest <= 12 << 20 && found.len() < points.len() * 9 / 10, "{}", found.len());
     }

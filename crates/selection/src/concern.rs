@@ -1,0 +1,31 @@
+//! The part of the plane where what is selected concerns a block.
+
+use crate::disc::Disc;
+use crate::selected_sites::SelectedSites;
+use delaunay::geometry::Bounds;
+
+/// A box and some discs. A box around all would be that of the whole cloud where a triangle is thin.
+#[derive(Debug)]
+pub(crate) struct Concern {
+    bounds: Bounds<2>,
+    discs: Vec<Disc>,
+}
+
+impl Concern {
+    /// The most discs: a block takes so little memory while it waits nowhere.
+    const MOST_DISCS: usize = 16;
+
+    /// Returns what holds a box and discs: the largest of these as they are, and the boxes of the others.
+    pub(crate) fn new(bounds: Bounds<2>, mut discs: Vec<Disc>) -> Concern {
+        discs.sort_unstable_by(|a, b| b.reach.total_cmp(&a.reach));
+        let small = discs.split_off(discs.len().min(Concern::MOST_DISCS));
+        discs.shrink_to_fit();
+        let bounds = small.iter().fold(bounds, |bounds, disc| bounds.union(disc.bounds()));
+        Concern { bounds, discs }
+    }
+
+    /// Tells whether one of the points that were added last to what is `selected` may lie in it.
+    pub(crate) fn has_newly(&self, selected: &SelectedSites) -> bool {
+        selected.has_newly_within(self.bounds) || self.discs.iter().any(|disc| selected.has_newly_near(disc))
+    }
+}
