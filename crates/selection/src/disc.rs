@@ -67,7 +67,12 @@ impl Disc {
         x * x + y * y
     }
 
-    /// Tells whether a point lies inside the circle of the triangle of `corners`, whose disc this is. None of the corners is.
+    /// Returns the disc of this reach about the same centre.
+    pub(crate) fn with_reach(&self, reach: f64) -> Disc {
+        Disc { reach, ..*self }
+    }
+
+    /// Tells whether a point of the disc lies inside the circle of the triangle of `corners`, which has the same centre. None of the corners does.
     #[inline]
     pub(crate) fn has_inside(&self, corners: [Site; 3], point: [i32; 3]) -> bool {
         let ([a, b, c], site) = (corners, [point[0], point[1]]);

@@ -115,6 +115,20 @@ impl<'a> SelectedSites<'a> {
     /// # Errors
     /// [`sys::Error::Io`] on the file of those that are not in memory.
     pub(crate) fn deepest_inside(&self, corners: [Site; 3], disc: Disc) -> Result<Option<[i32; 3]>> {
+        let widths = std::iter::successors(Some(disc.reach), |reach| Some(reach / 4.0));
+        let narrow = widths.take_while(|reach| *reach > self.side() as f64).collect::<Vec<f64>>();
+        // A disc may hold most of the cloud. If a small one about the same centre has a point, no other is deeper.
+        for reach in narrow.into_iter().skip(1).rev() {
+            let found = self.deepest_within(corners, disc.with_reach(reach))?;
+            if found.is_some() {
+                return Ok(found);
+            }
+        }
+        self.deepest_within(corners, disc)
+    }
+
+    /// Returns the point nearest to the centre of a disc among those in it that lie inside the circle of the triangle of `corners`.
+    fn deepest_within(&self, corners: [Site; 3], disc: Disc) -> Result<Option<[i32; 3]>> {
         let mut deepest: Option<(f64, [i32; 3])> = None;
         self.visit(&disc, |points| {
             for &point in points {
