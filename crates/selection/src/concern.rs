@@ -12,7 +12,7 @@ pub(crate) struct Concern {
 }
 
 impl Concern {
-    /// The most discs: a block takes so little memory while it waits nowhere.
+    /// The most discs, so that the memory which a block takes between rounds is bounded.
     const MOST_DISCS: usize = 16;
 
     /// Returns what holds a box and discs: the largest of these as they are, and the boxes of the others.

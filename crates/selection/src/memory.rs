@@ -48,8 +48,13 @@ impl BlockMemory {
     /// Tells whether a block of `points` points stays whose triangulation has `sites` sites, and which takes so many `bytes`. All that is selected
     /// takes `selected` bytes.
     pub(crate) fn keeps_block(&self, points: u64, sites: u64, bytes: u64, selected: u64) -> bool {
-        self.note_thread((points * BYTES_PER_LOADED).max(bytes + sites * BYTES_PER_TRIANGULATED));
+        self.note_block(points, sites, bytes);
         self.keeps(bytes, selected)
+    }
+
+    /// A thread had a block of `points` points whose triangulation has `sites` sites, and which takes so many `bytes`.
+    pub(crate) fn note_block(&self, points: u64, sites: u64, bytes: u64) {
+        self.note_thread((points * BYTES_PER_LOADED).max(bytes + sites * BYTES_PER_TRIANGULATED));
     }
 
     /// A block that took so many bytes no longer does.

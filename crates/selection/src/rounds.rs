@@ -106,7 +106,7 @@ pub(crate) struct Rounds<'a, E> {
     swap: SwapSpace,
     /// The points that are looked at.
     sample: Sample,
-    /// The area of the box of all points, in square lattice steps.
+    /// The area of the box of the points, in square lattice steps.
     area: f64,
     figures: Figures,
 }
@@ -223,7 +223,8 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         self.memory.note_proposal(proposal.bytes());
         state.settled = block.settled_within();
         if is_new && self.sample.is_all() && state.settled.is_some() {
-            // It is far from the borders of regions, and hardly needed again.
+            // Most of these are far from the borders of regions, and not needed again.
+            self.memory.note_block(state.points, block.sites(), block.bytes());
             state.errors = Some(self.errors_of(&block));
         } else {
             self.put_block(block, &mut state)?;

@@ -378,7 +378,9 @@ fn regions_depend_on_the_points_alone() {
             cloud.offset = offset.map(i64::from);
             let bounds = bounds_of(&points);
             let found = crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap();
-            let mut all: Vec<_> = found.sites.within(bounds).unwrap().into_iter().map(back).collect();
+            let all: BTreeSet<_> = found.sites.within(bounds).unwrap().into_iter().collect();
+            holds_the_others(&all, &points, &found.holding);
+            let mut all: Vec<_> = all.into_iter().map(back).collect();
             all.sort_unstable();
             let worst = found.figures.worst.map(back);
             (all, Figures { worst, ..found.figures })
