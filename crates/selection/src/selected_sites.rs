@@ -115,10 +115,10 @@ impl<'a> SelectedSites<'a> {
     /// # Errors
     /// [`sys::Error::Io`] on the file of those that are not in memory.
     pub(crate) fn deepest_inside(&self, corners: [Site; 3], disc: Disc) -> Result<Option<[i32; 3]>> {
-        let widths = std::iter::successors(Some(disc.reach), |reach| Some(reach / 4.0));
-        let narrow = widths.take_while(|reach| *reach > self.side() as f64).collect::<Vec<f64>>();
-        // A disc may hold most of the cloud. If a small one about the same centre has a point, no other is deeper.
-        for reach in narrow.into_iter().skip(1).rev() {
+        // A disc may hold most of the cloud. If a smaller one about the same centre has a point, no other is deeper.
+        let quarters = std::iter::successors(Some(disc.reach / 4.0), |reach| Some(reach / 4.0));
+        let smaller: Vec<f64> = quarters.take_while(|reach| *reach > self.side() as f64).collect();
+        for reach in smaller.into_iter().rev() {
             let found = self.deepest_within(corners, disc.with_reach(reach))?;
             if found.is_some() {
                 return Ok(found);
