@@ -138,14 +138,17 @@ fn tasks_of_local_end_with_the_engine() {
     completes(&rig, 2, "after the engine was killed");
 }
 
-/// Begins all parts of `phase`, and stops the process while it works on the first.
+/// Begins all parts of `phase`, and stops the process at a `place` within the first.
 #[track_caller]
-fn stopped_worker(rig: &Rig, phase: &str) -> Run {
+fn stopped_worker(rig: &Rig, phase: &str, place: &str) -> Run {
     up_to(rig, phase, 1);
-    let before = stored(rig, 0);
-    let mut worker = Run::start(&mut task(rig, phase, "1/1"));
-    worker.wait_until(|| stored(rig, 0) > before);
-    worker.signal("STOP");
+    let mut worker = Run::start(task(rig, phase, "1/1").env("GDT_FAULT", format!("{place}:1")).env("GDT_STOPS", "1"));
+    let process = worker.child.id();
+    worker.wait_until(|| {
+        // The name before the state may have parentheses of its own, the rest has none.
+        let status = fs::read_to_string(format!("/proc/{process}/stat")).unwrap();
+        status.rsplit(')').next().unwrap().trim_start().starts_with('T')
+    });
     worker
 }
 
@@ -159,7 +162,7 @@ fn stored(rig: &Rig, part: u32) -> u64 {
 #[test]
 fn a_second_worker_leaves_a_part_that_another_has() {
     let rig = job_of_parts();
-    let first = stopped_worker(&rig, "mesh");
+    let first = stopped_worker(&rig, "mesh", "leaf");
     let second = run(task(&rig, "mesh", "1/1")).stopped(&["is left out: process", "is working in"]);
     assert!(second.err.contains(&format!("process {} on", first.child.id())), "{}", second.err);
     // It has done the others.
@@ -176,7 +179,7 @@ fn a_second_worker_leaves_a_part_that_another_has() {
 #[test]
 fn two_workers_of_the_phase_tiles_write_each_tile_once() {
     let rig = job_of_parts();
-    let first = stopped_worker(&rig, "tiles");
+    let first = stopped_worker(&rig, "tiles", "tile");
     run(task(&rig, "tiles", "1/1")).stopped(&["is left out: process", "is working in"]);
     first.signal("CONT");
     first.end().succeeded();

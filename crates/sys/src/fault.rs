@@ -35,12 +35,16 @@ pub fn die() -> ! {
     std::process::abort()
 }
 
-/// Marks a place where a test may kill the process.
+/// Marks a place where a test may kill the process, or stop it until a signal lets it continue (`GDT_STOPS`).
 #[inline]
 pub fn point(name: &str) {
     mark(name);
     if is_due(name) {
-        die();
+        if variable("GDT_STOPS").is_none() {
+            die();
+        }
+        #[cfg(unix)]
+        let _ = signal_hook::low_level::raise(signal_hook::consts::SIGSTOP);
     }
 }
 
