@@ -43,6 +43,28 @@ impl LatticeCells {
         1 << self.shift
     }
 
+    /// Returns cells as large whose corners are the middles of these.
+    pub(crate) fn shifted(self) -> LatticeCells {
+        let half = (self.side() / 2) as i32;
+        LatticeCells { offset: self.offset.map(|offset| (offset + half) & ((1 << MOST_SHIFT) - 1)), ..self }
+    }
+
+    /// Returns the box that reaches so many steps from the middle of a cell in x and y, as far as it lies in `bounds`.
+    pub(crate) fn about_middle(self, cell: [i32; 2], reach: [i64; 2], bounds: Bounds<2>) -> Bounds<2> {
+        let (axes, middle) = ([0, 1], self.middle(cell));
+        Bounds {
+            min: axes.map(|axis| (middle[axis] - reach[axis]).max(bounds.min[axis].into()) as i32),
+            max: axes.map(|axis| (middle[axis] + reach[axis] - 1).min(bounds.max[axis].into()) as i32),
+        }
+    }
+
+    /// Returns all cells that a box meets.
+    pub(crate) fn of_box(self, bounds: Bounds<2>) -> impl Iterator<Item = [i32; 2]> {
+        let ([west, south], [east, north]) =
+            (self.of(bounds.min[0], bounds.min[1]), self.of(bounds.max[0], bounds.max[1]));
+        (south..=north).flat_map(move |row| (west..=east).map(move |column| [column, row]))
+    }
+
     /// Returns cells of a quarter of the side, or of one step, and how many of them lie along a side of these; `None` if these cells are one step
     /// wide.
     pub(crate) fn finer(self) -> Option<(LatticeCells, i32)> {

@@ -1,10 +1,12 @@
 //! Clouds of many points: each region of the plane by itself, and then all together.
 //!
 //! Every round of a whole cloud reads all of it, if the memory does not hold it. So points are selected from each region as if it were a cloud
-//! of its own. After that only triangles across the borders of regions have points that exceed the bound, and few rounds are left.
+//! of its own. After that only triangles across the borders of regions have points that exceed the bound. So points are selected next from strips
+//! along these borders, those about each corner of regions together, beside what is selected around them. Few rounds are left.
 //!
 //! Regions are cells of the lattice, and how large they are depends on the number of the points and their box alone. So does the result.
 
+use crate::area::{Area, is_in};
 use crate::hull::hull_corners;
 use crate::lattice_cells::LatticeCells;
 use crate::memory::BlockMemory;
@@ -40,6 +42,8 @@ pub(crate) struct Division<'a, E> {
     pub(crate) blocks: Vec<BlockState>,
     /// The regions that have points.
     pub(crate) regions: Vec<Region<'a, E>>,
+    /// The strips along their borders: about each corner of regions a region with those strips that reach from there half a side.
+    pub(crate) strips: Vec<Region<'a, E>>,
 }
 
 /// Divides a cloud, which has `points` points in `bounds`. Points of its blocks that are in `memory` do not stay there. Looks for bays if there are
@@ -83,22 +87,50 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
             of_region.push(block);
         }
     }
-    let region = |(cell, (bounds, blocks))| Region { source, cells, cell, blocks, bounds, taken: 0 };
+    let strips = strips(source, &blocks, cells.shifted(), bounds);
+    let region = |(cell, (of_points, blocks))| {
+        let parts = [cells.about_middle(cell, [cells.side() / 2; 2], bounds); 2];
+        Region { source, parts, blocks, bounds: of_points, taken: 0 }
+    };
+    let regions = regions.into_iter().map(region).collect();
     let bays = marked.map(|marked| {
         let (marked, hull) = marked.into_inner().unwrap_or_else(PoisonError::into_inner);
         marked.bays(&hull)
     });
-    Ok(Division { bays, blocks, regions: regions.into_iter().map(region).collect() })
+    Ok(Division { bays, blocks, regions, strips })
 }
 
-/// The points of a cloud that lie in a cell of the lattice.
+/// Returns the strips along the lines through the middle of each of these cells that may have points of `blocks`, all of which lie in `bounds`.
+fn strips<'a, E>(
+    source: &'a dyn PointSource<Error = E>,
+    blocks: &[BlockState],
+    cells: LatticeCells,
+    bounds: Bounds<2>,
+) -> Vec<Region<'a, E>> {
+    let mut of_cells = BTreeMap::<[i32; 2], Vec<usize>>::new();
+    let [half, quarter, narrow] = [2, 4, 8].map(|share| cells.side() / share);
+    let strips = |cell| [[narrow, half], [half, narrow]].map(|reach| cells.about_middle(cell, reach, bounds));
+    for (number, block) in blocks.iter().enumerate() {
+        let Some(bounds) = block.bounds else { continue };
+        for cell in cells.of_box(bounds).filter(|cell| strips(*cell).iter().any(|strip| strip.meets(&bounds))) {
+            of_cells.entry(cell).or_default().push(number);
+        }
+    }
+    let region = |(cell, blocks)| {
+        let surroundings = cells.about_middle(cell, [half + quarter; 2], bounds);
+        Region { source, parts: strips(cell), blocks, bounds: surroundings, taken: 0 }
+    };
+    of_cells.into_iter().map(region).collect()
+}
+
+/// The points of a cloud that lie in a cell of the lattice, or in strips of one.
 pub(crate) struct Region<'a, E> {
     source: &'a dyn PointSource<Error = E>,
-    cells: LatticeCells,
-    cell: [i32; 2],
-    /// The blocks that have some.
+    /// The boxes that its points lie in.
+    parts: [Bounds<2>; 2],
+    /// The blocks that may have some.
     blocks: Vec<usize>,
-    /// The box of its points.
+    /// A box that holds its points; of strips, one that holds what is around them too.
     pub(crate) bounds: Bounds<2>,
     /// The bytes of memory that points of other regions take which are selected.
     taken: u64,
@@ -124,7 +156,7 @@ impl<E: Send + From<sys::Error>> PointSource for Region<'_, E> {
 
     fn load(&self, block: usize) -> Result<BlockPoints, E> {
         let BlockPoints { mut points, mut fixed } = self.source.load(self.blocks[block])?;
-        let is_here = |&[x, y, _]: &[i32; 3]| self.cells.of(x, y) == self.cell;
+        let is_here = |point: &[i32; 3]| self.parts.iter().any(|part| is_in(part, point));
         points.retain(is_here);
         fixed.retain(is_here);
         Ok(BlockPoints { points, fixed })

@@ -142,9 +142,9 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         self.selected.add(first)
     }
 
-    /// Returns the bytes of memory that selected points take.
-    pub(crate) fn selected_bytes(&self) -> u64 {
-        self.selected.bytes()
+    /// Returns the points that are selected so far.
+    pub(crate) fn selected(&self) -> &SelectedSites<'a> {
+        &self.selected
     }
 
     /// Does all rounds, over these samples one after the other, and returns what they select. Of points on one line that is all of them. `outline` are
@@ -171,7 +171,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             if number > 0 {
                 self.add_beyond(very_far_above(bound))?;
             }
-            self.down_to(&sample.bound(bound, self.figures.points, self.area))?;
+            self.down_to(&sample.bound(bound, self.figures.points, self.area), |_| ())?;
         }
         self.finish()
     }
@@ -186,14 +186,30 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         self.add_round(beyond.into_iter().flatten()).map(|_| ())
     }
 
-    /// Does rounds until no point of the sample exceeds `bound`.
-    fn down_to(&mut self, bound: &RoundBound) -> Result<(), E> {
+    /// Does rounds over all points, and returns what they select and how many there were. `outline` are the corners of the hull of the cloud, three at
+    /// least.
+    ///
+    /// # Errors
+    /// Those of the source.
+    pub(crate) fn select_more(mut self, outline: Vec<[i32; 3]>, bound: ErrorBound) -> Result<(Vec<[i32; 3]>, u32), E> {
+        self.outline = outline;
+        let mut more = Vec::new();
+        self.down_to(&RoundBound::everywhere(bound), |found| more.push(found))?;
+        for state in &self.blocks {
+            self.free_place(&mut state.lock().unwrap_or_else(PoisonError::into_inner))?;
+        }
+        Ok((more, self.figures.rounds))
+    }
+
+    /// Does rounds until no point of the sample exceeds `bound`. Hands over what they select.
+    fn down_to(&mut self, bound: &RoundBound, mut take: impl FnMut([i32; 3])) -> Result<(), E> {
         loop {
             self.memory.begin_round();
             let proposals =
                 (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|block| self.proposal_of(block, bound));
             let proposals = proposals.collect::<Result<Vec<_>, E>>()?;
-            if !self.add_round(accepted(&proposals, far_above(bound.usual)))? {
+            let found = accepted(&proposals, far_above(bound.usual)).inspect(|found| take(*found));
+            if !self.add_round(found)? {
                 return Ok(());
             }
         }

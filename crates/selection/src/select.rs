@@ -4,10 +4,11 @@ use crate::error_bound::ErrorBound;
 use crate::hull::hull_corners;
 use crate::memory::BlockMemory;
 use crate::outline::MarkedCells;
-use crate::regions::{Division, RegionSizes, divide};
+use crate::regions::{Division, Region, RegionSizes, divide};
 use crate::rounds::{BlockState, Rounds, Selection};
 use crate::sample::Sample;
 use crate::seeds::Seeds;
+use crate::selected_sites::SelectedSites;
 use crate::source::{BlockPoints, PointSource};
 use delaunay::geometry::Bounds;
 use rayon::prelude::*;
@@ -53,19 +54,43 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
         return rounds.run(hull, 0, bound, Sample::ladder(source.offset()));
     }
     let cells = bays.is_none().then(|| MarkedCells::none(bounds, points, source.offset()));
-    let Division { bays: own, blocks, regions } = divide(source, blocks, &memory, bounds, points, sizes, cells)?;
+    let Division { bays: own, blocks, regions, strips } =
+        divide(source, blocks, &memory, bounds, points, sizes, cells)?;
     let bays = bays.or(own.as_ref());
     let mut rounds = Rounds::new(source, blocks, bounds, memory);
     let (mut corners, mut most) = (Vec::new(), 0);
     for region in &regions {
-        let region = region.after(rounds.selected_bytes());
+        let region = region.after(rounds.selected().bytes());
         let of_region = select_by_regions(&region, bound, sizes, bays)?;
         most = most.max(of_region.figures.rounds);
         let selected = of_region.sites.within(region.bounds)?;
         corners.extend(hull_corners(selected.clone()));
         rounds.add(selected)?;
     }
-    rounds.run(hull_corners(corners), most, bound, std::iter::once(Sample::all(source.offset())))
+    let hull = hull_corners(corners);
+    for strips in strips.iter().filter(|_| hull.len() > 2) {
+        let (newly, done) = select_beside(strips, rounds.selected(), &hull, bound)?;
+        most = most.max(done);
+        rounds.add(newly)?;
+    }
+    rounds.run(hull, most, bound, std::iter::once(Sample::all(source.offset())))
+}
+
+/// Selects points of strips beside those that are `selected` around them, and returns them with the number of rounds. The `hull` is that of the
+/// whole cloud.
+fn select_beside<E: Send + From<sys::Error>>(
+    strips: &Region<E>,
+    selected: &SelectedSites,
+    hull: &[[i32; 3]],
+    bound: ErrorBound,
+) -> Result<(Vec<[i32; 3]>, u32), E> {
+    let known = selected.within(strips.bounds)?;
+    let strips = &strips.after(selected.bytes());
+    let memory = BlockMemory::new(strips.memory());
+    let blocks = load_blocks(strips, &memory)?;
+    let mut rounds = Rounds::new(strips, blocks, strips.bounds, memory);
+    rounds.add(known)?;
+    rounds.select_more(hull.to_vec(), bound)
 }
 
 /// Loads all blocks once. Points are counted here, because a caller may not know which of them share a place. They stay in `memory` if it holds

@@ -1,6 +1,8 @@
 //! Selections compared with the plainest way to them.
 
 use crate::error_bound::RoundBound;
+use crate::memory::BlockMemory;
+use crate::rounds::BlockState;
 use crate::sample::{Sample, very_far_above};
 use crate::*;
 use delaunay::geometry::predicates::orient2d;
@@ -395,6 +397,44 @@ fn regions_depend_on_the_points_alone() {
         assert_eq!(worst_points(&points, &chosen, &RoundBound::everywhere(bound)), Vec::new());
         assert!(points[700..702].iter().all(|point| chosen.contains(point)));
         assert!(figures.greatest <= 12 << 20 && found.len() < points.len() * 9 / 10, "{}", found.len());
+    }
+}
+
+/// Of points on one line all are selected.
+#[test]
+fn points_on_a_line_have_no_strips() {
+    let points: Vec<[i32; 3]> = (0..2_000).map(|i| [3 * i, 7 * i, i % 5]).collect();
+    let sizes = crate::regions::RegionSizes { undivided: 1_600, points: 100 };
+    let cloud = Cloud::new(&points, &[], 700, AMPLE);
+    let found = crate::select::select_by_regions(&cloud, ErrorBound::new(12, 1), sizes, None).unwrap();
+    assert_eq!(found.figures.selected, 2_000);
+}
+
+/// Strips along the borders of regions have all points near these, once, and no others.
+#[test]
+fn strips_lie_along_the_borders_of_regions() {
+    let points: Vec<[i32; 3]> = (0..40_000).map(|i| [i % 200 - 90, i / 200 - 77, 0]).collect();
+    for offset in [[0; 2], [12_345, -999]] {
+        let mut cloud = Cloud::new(&points, &[], 23, AMPLE);
+        cloud.offset = offset;
+        let sizes = crate::regions::RegionSizes { undivided: 20_000, points: 1_000 };
+        let blocks = cloud.blocks.iter().map(|block| BlockState::of(&block.points)).collect();
+        let (memory, bounds) = (BlockMemory::new(AMPLE), bounds_of(&points));
+        let division = crate::regions::divide(&cloud, blocks, &memory, bounds, 40_000, sizes, None).unwrap();
+        let of = |region: &crate::regions::Region<_>| -> Vec<[i32; 3]> {
+            (0..region.blocks()).flat_map(|block| region.load(block).unwrap().points).collect()
+        };
+        let mut of_regions: Vec<_> = division.regions.iter().flat_map(of).collect();
+        of_regions.sort_unstable();
+        let mut sorted = points.clone();
+        sorted.sort_unstable();
+        assert!(of_regions == sorted && division.regions.len() > 25);
+        // Regions are 32 steps wide, so that a strip reaches four steps from a border.
+        let is_near = |p: &[i32; 3]| (0..2).any(|k| (i64::from(p[k]) + offset[k] + 4).rem_euclid(32) < 8);
+        sorted.retain(is_near);
+        let mut of_strips: Vec<_> = division.strips.iter().flat_map(of).collect();
+        of_strips.sort_unstable();
+        assert_eq!(of_strips, sorted, "{offset:?}");
     }
 }
 
