@@ -6,10 +6,7 @@ use crate::scattered;
 #[test]
 fn a_second_process_is_told_which_process_works_in_the_directory() {
     let rig = Rig::new(&scattered::gaussian(40_000), &Setup::tiles_of(1_000));
-    let mut first = Run::start(&mut rig.command());
-    let journal = rig.out().join("job/journal");
-    first.wait_until(|| journal.exists());
-    first.signal("STOP");
+    let first = Run::stopped_at(&mut rig.command(), "leaf", 1);
     let second = rig.run().stopped(&["is working in", "another [output] directory"]);
     assert!(second.err.contains(&first.child.id().to_string()), "{}", second.err);
     assert!(!second.err.contains("run the same command again"), "it has no steps to go on with: {}", second.err);

@@ -111,6 +111,19 @@ impl Run {
         Run { child: child.expect("the program starts"), logs }
     }
 
+    /// Starts a run and waits until it has stopped itself where `place`, a name, comes for the `count`-th time.
+    #[track_caller]
+    pub(crate) fn stopped_at(command: &mut Command, place: &str, count: u32) -> Run {
+        let mut run = Run::start(command.env("GDT_FAULT", format!("{place}:{count}")).env("GDT_STOPS", "1"));
+        let process = run.child.id();
+        run.wait_until(|| {
+            // The name before the state may have parentheses of its own, the rest has none.
+            let status = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap();
+            status.rsplit(')').next().unwrap().trim_start().starts_with('T')
+        });
+        run
+    }
+
     /// Waits for the end, but not for ever, and asserts that nothing panicked.
     #[track_caller]
     pub(crate) fn end(mut self) -> End {

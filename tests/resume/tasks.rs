@@ -142,14 +142,7 @@ fn tasks_of_local_end_with_the_engine() {
 #[track_caller]
 fn stopped_worker(rig: &Rig, phase: &str, place: &str) -> Run {
     up_to(rig, phase, 1);
-    let mut worker = Run::start(task(rig, phase, "1/1").env("GDT_FAULT", format!("{place}:1")).env("GDT_STOPS", "1"));
-    let process = worker.child.id();
-    worker.wait_until(|| {
-        // The name before the state may have parentheses of its own, the rest has none.
-        let status = fs::read_to_string(format!("/proc/{process}/stat")).unwrap();
-        status.rsplit(')').next().unwrap().trim_start().starts_with('T')
-    });
-    worker
+    Run::stopped_at(&mut task(rig, phase, "1/1"), place, 1)
 }
 
 /// Returns the bytes in the store of a part.
@@ -199,10 +192,7 @@ fn a_small_job_that_was_interrupted_may_be_submitted() {
 #[test]
 fn tasks_wait_for_a_process_that_has_the_job_alone() {
     let rig = job_of_parts();
-    let mut alone = Run::start(&mut rig.command());
-    let begun = rig.out().join("job/parts/2");
-    alone.wait_until(|| begun.exists());
-    alone.signal("STOP");
+    let alone = Run::stopped_at(&mut rig.command(), "leaf", 1);
     for phase in ["read", "mesh", "join", "tiles", "levels"] {
         run(task(&rig, phase, "1/1")).stopped(&[&format!("process {} on", alone.child.id()), "is working in"]);
     }
@@ -215,10 +205,10 @@ fn tasks_wait_for_a_process_that_has_the_job_alone() {
 fn a_task_that_is_asked_to_stop_keeps_what_it_has_done() {
     let rig = job_of_parts();
     up_to(&rig, "mesh", 1);
-    let before = stored(&rig, 1);
-    let mut asked = Run::start(&mut task(&rig, "mesh", "1/1"));
-    asked.wait_until(|| stored(&rig, 1) > before);
+    // After at least one part.
+    let asked = Run::stopped_at(&mut task(&rig, "mesh", "1/1"), "leaf", 6);
     asked.signal("TERM");
+    asked.signal("CONT");
     asked.end().stopped(&["interrupted"]);
     let again = run(rig.command_of(&["status", "job.toml", "--json"])).succeeded();
     let status: serde_json::Value = serde_json::from_str(&again.out).unwrap();
