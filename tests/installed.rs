@@ -47,7 +47,8 @@ fn no_environment_variable_kills_the_installed_program() {
     for fault in FAULTS {
         let mut program = Command::new(env!("CARGO_BIN_EXE_gdt-batch"));
         program.arg("job.toml").current_dir(folder.path()).env("GDT_FAULT", fault);
-        let output = program.envs([("GDT_TRACE", "trace"), ("GDT_PREVIEW", "100")]).output().unwrap();
+        let output =
+            program.envs([("GDT_TRACE", "trace"), ("GDT_STOPS", "1"), ("GDT_PREVIEW", "100")]).output().unwrap();
         assert!(output.status.success(), "{fault}: {output:?}");
         assert!(!folder.path().join("trace").exists(), "changes of files are written down");
         let preview = fs::read(folder.path().join("out/preview.png")).unwrap();

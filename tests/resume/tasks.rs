@@ -205,8 +205,8 @@ fn tasks_wait_for_a_process_that_has_the_job_alone() {
 fn a_task_that_is_asked_to_stop_keeps_what_it_has_done() {
     let rig = job_of_parts();
     up_to(&rig, "mesh", 1);
-    // After at least one part.
-    let asked = Run::stopped_at(&mut task(&rig, "mesh", "1/1"), "leaf", 6);
+    // The first part is done.
+    let asked = Run::stopped_at(&mut task(&rig, "mesh", "1/1"), "committed", 1);
     asked.signal("TERM");
     asked.signal("CONT");
     asked.end().stopped(&["interrupted"]);

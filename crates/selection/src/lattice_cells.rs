@@ -43,13 +43,13 @@ impl LatticeCells {
         1 << self.shift
     }
 
-    /// Returns cells as large whose corners are the middles of these.
+    /// Returns cells of the same size whose corners are the middles of these.
     pub(crate) fn shifted(self) -> LatticeCells {
         let half = (self.side() / 2) as i32;
         LatticeCells { offset: self.offset.map(|offset| (offset + half) & ((1 << MOST_SHIFT) - 1)), ..self }
     }
 
-    /// Returns the box that reaches so many steps from the middle of a cell in x and y, as far as it lies in `bounds`.
+    /// Returns the box that reaches so many steps from the middle of a cell in x and y, as far as it lies in `bounds`. It may be empty.
     pub(crate) fn about_middle(self, cell: [i32; 2], reach: [i64; 2], bounds: Bounds<2>) -> Bounds<2> {
         let (axes, middle) = ([0, 1], self.middle(cell));
         Bounds {

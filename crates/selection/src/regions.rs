@@ -2,7 +2,7 @@
 //!
 //! Every round of a whole cloud reads all of it, if the memory does not hold it. So points are selected from each region as if it were a cloud
 //! of its own. After that only triangles across the borders of regions have points that exceed the bound. So points are selected next from strips
-//! along these borders, those about each corner of regions together, beside what is selected around them. Few rounds are left.
+//! along these borders, for each corner of regions from the strips that meet there. Few rounds over the whole cloud are left.
 //!
 //! Regions are cells of the lattice, and how large they are depends on the number of the points and their box alone. So does the result.
 
@@ -42,7 +42,7 @@ pub(crate) struct Division<'a, E> {
     pub(crate) blocks: Vec<BlockState>,
     /// The regions that have points.
     pub(crate) regions: Vec<Region<'a, E>>,
-    /// The strips along their borders: about each corner of regions a region with those strips that reach from there half a side.
+    /// For each corner of regions, the strips along the borders that meet there, as far as the middles of these.
     pub(crate) strips: Vec<Region<'a, E>>,
 }
 
@@ -64,9 +64,11 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
     let marked = cells_of_bays.map(|cells| Mutex::new((cells, Vec::new())));
     let share = |(number, mut state): (usize, BlockState)| {
         let points = state.take_points(source, memory, number)?;
-        let mut shares = BTreeMap::<[i32; 2], Bounds<2>>::new();
+        let mut shares = BTreeMap::<[i32; 2], (Bounds<2>, u64)>::new();
         for &[x, y, _] in &points {
-            shares.entry(cells.of(x, y)).or_insert(Bounds::of_point([x, y])).include([x, y]);
+            let (bounds, count) = shares.entry(cells.of(x, y)).or_insert((Bounds::of_point([x, y]), 0));
+            bounds.include([x, y]);
+            *count += 1;
         }
         if let Some(marked) = &marked {
             let corners = hull_corners(points.clone());
@@ -77,19 +79,21 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
         Ok((state, shares))
     };
     let found = blocks.into_par_iter().enumerate().with_max_len(1).map(share).collect::<Result<Vec<_>, E>>()?;
-    let mut regions = BTreeMap::<[i32; 2], (Bounds<2>, Vec<usize>)>::new();
+    let mut regions = BTreeMap::<[i32; 2], (Bounds<2>, u64, Vec<usize>)>::new();
     let mut blocks = Vec::with_capacity(found.len());
     for (block, (state, shares)) in found.into_iter().enumerate() {
         blocks.push(state);
         for (cell, share) in shares {
-            let (bounds, of_region) = regions.entry(cell).or_insert((share, Vec::new()));
-            *bounds = bounds.union(share);
+            let (bounds, count, of_region) = regions.entry(cell).or_insert((share.0, 0, Vec::new()));
+            *bounds = bounds.union(share.0);
+            *count += share.1;
             of_region.push(block);
         }
     }
-    let strips = strips(source, &blocks, cells.shifted(), bounds);
-    let region = |(cell, (of_points, blocks))| {
-        let parts = [cells.about_middle(cell, [cells.side() / 2; 2], bounds); 2];
+    let is_crowded = |cell: [i32; 2]| regions.get(&cell).is_some_and(|(_, count, _)| *count > sizes.undivided);
+    let strips = strips(source, &blocks, cells, bounds, is_crowded);
+    let region = |(cell, (of_points, _, blocks))| {
+        let parts = vec![cells.about_middle(cell, [cells.side() / 2; 2], bounds)];
         Region { source, parts, blocks, bounds: of_points, taken: 0 }
     };
     let regions = regions.into_iter().map(region).collect();
@@ -100,34 +104,42 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
     Ok(Division { bays, blocks, regions, strips })
 }
 
-/// Returns the strips along the lines through the middle of each of these cells that may have points of `blocks`, all of which lie in `bounds`.
+/// Returns the strips along the borders of these cells that may have points of `blocks`, all of which lie in `bounds`. There are none at the corners
+/// of crowded cells: what is selected around these strips would not fit in the memory.
 fn strips<'a, E>(
     source: &'a dyn PointSource<Error = E>,
     blocks: &[BlockState],
     cells: LatticeCells,
     bounds: Bounds<2>,
+    is_crowded: impl Fn([i32; 2]) -> bool,
 ) -> Vec<Region<'a, E>> {
-    let mut of_cells = BTreeMap::<[i32; 2], Vec<usize>>::new();
+    // The corners of the cells are the middles of these.
+    let shifted = cells.shifted();
     let [half, quarter, narrow] = [2, 4, 8].map(|share| cells.side() / share);
-    let strips = |cell| [[narrow, half], [half, narrow]].map(|reach| cells.about_middle(cell, reach, bounds));
+    let arms = |corner| [[narrow, half], [half, narrow]].map(|reach| shifted.about_middle(corner, reach, bounds));
+    let mut of_corners = BTreeMap::<[i32; 2], Vec<usize>>::new();
     for (number, block) in blocks.iter().enumerate() {
-        let Some(bounds) = block.bounds else { continue };
-        for cell in cells.of_box(bounds).filter(|cell| strips(*cell).iter().any(|strip| strip.meets(&bounds))) {
-            of_cells.entry(cell).or_default().push(number);
+        let Some(of_block) = block.bounds else { continue };
+        for corner in shifted.of_box(of_block).filter(|corner| arms(*corner).iter().any(|arm| arm.meets(&of_block))) {
+            of_corners.entry(corner).or_default().push(number);
         }
     }
-    let region = |(cell, blocks)| {
-        let surroundings = cells.about_middle(cell, [half + quarter; 2], bounds);
-        Region { source, parts: strips(cell), blocks, bounds: surroundings, taken: 0 }
+    let is_at_crowd = |corner| {
+        let [x, y] = shifted.middle(corner).map(|along| along as i32);
+        [[x - 1, y - 1], [x, y - 1], [x - 1, y], [x, y]].into_iter().any(|[x, y]| is_crowded(cells.of(x, y)))
     };
-    of_cells.into_iter().map(region).collect()
+    let region = |(corner, blocks)| {
+        let surroundings = shifted.about_middle(corner, [half + quarter; 2], bounds);
+        Region { source, parts: arms(corner).to_vec(), blocks, bounds: surroundings, taken: 0 }
+    };
+    of_corners.into_iter().filter(|(corner, _)| !is_at_crowd(*corner)).map(region).collect()
 }
 
 /// The points of a cloud that lie in a cell of the lattice, or in strips of one.
 pub(crate) struct Region<'a, E> {
     source: &'a dyn PointSource<Error = E>,
     /// The boxes that its points lie in.
-    parts: [Bounds<2>; 2],
+    parts: Vec<Bounds<2>>,
     /// The blocks that may have some.
     blocks: Vec<usize>,
     /// A box that holds its points; of strips, one that holds what is around them too.
@@ -139,7 +151,7 @@ pub(crate) struct Region<'a, E> {
 impl<E> Region<'_, E> {
     /// Returns the region when the selected points of others take so many bytes of memory.
     pub(crate) fn after(&self, taken: u64) -> Self {
-        Region { blocks: self.blocks.clone(), taken, ..*self }
+        Region { parts: self.parts.clone(), blocks: self.blocks.clone(), taken, ..*self }
     }
 }
 

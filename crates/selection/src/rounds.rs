@@ -28,7 +28,7 @@ pub struct Figures {
     pub points: u64,
     /// The points that were selected.
     pub selected: u64,
-    /// The rounds that selected some.
+    /// The rounds that selected some. Of those of regions, and of those along their borders, the most that one has taken.
     pub rounds: u32,
     /// The greatest distance of a point, in 2^-20 lattice steps of height, rounded down.
     pub greatest: u64,
@@ -108,6 +108,8 @@ pub(crate) struct Rounds<'a, E> {
     sample: Sample,
     /// The area of the box of the points, in square lattice steps.
     area: f64,
+    /// Whether the distances of all points are wanted in the end.
+    wants_errors: bool,
     figures: Figures,
 }
 
@@ -130,6 +132,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             swap: SwapSpace::default(),
             sample: Sample::all(source.offset()),
             area: area_of(bounds),
+            wants_errors: true,
             figures: Figures { points, ..Figures::default() },
         }
     }
@@ -192,12 +195,13 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
     /// # Errors
     /// Those of the source.
     pub(crate) fn select_more(mut self, outline: Vec<[i32; 3]>, bound: ErrorBound) -> Result<(Vec<[i32; 3]>, u32), E> {
-        self.outline = outline;
+        (self.outline, self.wants_errors) = (outline, false);
         let mut more = Vec::new();
         self.down_to(&RoundBound::everywhere(bound), |found| more.push(found))?;
         for state in &self.blocks {
             self.free_place(&mut state.lock().unwrap_or_else(PoisonError::into_inner))?;
         }
+        self.selected.free()?;
         Ok((more, self.figures.rounds))
     }
 
@@ -238,7 +242,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         let proposal = block.propose(bound);
         self.memory.note_proposal(proposal.bytes());
         state.settled = block.settled_within();
-        if is_new && self.sample.is_all() && state.settled.is_some() {
+        if is_new && self.wants_errors && self.sample.is_all() && state.settled.is_some() {
             // Most of these are far from the borders of regions, and not needed again.
             self.memory.note_block(state.points, block.sites(), block.bytes());
             state.errors = Some(self.errors_of(&block));

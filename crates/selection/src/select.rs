@@ -9,7 +9,7 @@ use crate::rounds::{BlockState, Rounds, Selection};
 use crate::sample::Sample;
 use crate::seeds::Seeds;
 use crate::selected_sites::SelectedSites;
-use crate::source::{BlockPoints, PointSource};
+use crate::source::{BYTES_PER_LISTED, BlockPoints, PointSource};
 use delaunay::geometry::Bounds;
 use rayon::prelude::*;
 
@@ -58,34 +58,37 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
         divide(source, blocks, &memory, bounds, points, sizes, cells)?;
     let bays = bays.or(own.as_ref());
     let mut rounds = Rounds::new(source, blocks, bounds, memory);
-    let (mut corners, mut most) = (Vec::new(), 0);
+    let (mut corners, mut most, mut most_of_strips) = (Vec::new(), 0, 0);
     for region in &regions {
         let region = region.after(rounds.selected().bytes());
         let of_region = select_by_regions(&region, bound, sizes, bays)?;
         most = most.max(of_region.figures.rounds);
         let selected = of_region.sites.within(region.bounds)?;
+        of_region.sites.free()?;
         corners.extend(hull_corners(selected.clone()));
         rounds.add(selected)?;
     }
     let hull = hull_corners(corners);
-    for strips in strips.iter().filter(|_| hull.len() > 2) {
-        let (newly, done) = select_beside(strips, rounds.selected(), &hull, bound)?;
-        most = most.max(done);
-        rounds.add(newly)?;
+    if hull.len() > 2 {
+        for strips in &strips {
+            let (newly, done) = select_beside(strips, rounds.selected(), &hull, bound)?;
+            most_of_strips = most_of_strips.max(done);
+            rounds.add(newly)?;
+        }
     }
-    rounds.run(hull, most, bound, std::iter::once(Sample::all(source.offset())))
+    rounds.run(hull, most + most_of_strips, bound, std::iter::once(Sample::all(source.offset())))
 }
 
 /// Selects points of strips beside those that are `selected` around them, and returns them with the number of rounds. The `hull` is that of the
 /// whole cloud.
-fn select_beside<E: Send + From<sys::Error>>(
+pub(crate) fn select_beside<E: Send + From<sys::Error>>(
     strips: &Region<E>,
     selected: &SelectedSites,
     hull: &[[i32; 3]],
     bound: ErrorBound,
 ) -> Result<(Vec<[i32; 3]>, u32), E> {
     let known = selected.within(strips.bounds)?;
-    let strips = &strips.after(selected.bytes());
+    let strips = &strips.after(selected.bytes() + known.len() as u64 * BYTES_PER_LISTED);
     let memory = BlockMemory::new(strips.memory());
     let blocks = load_blocks(strips, &memory)?;
     let mut rounds = Rounds::new(strips, blocks, strips.bounds, memory);

@@ -52,6 +52,15 @@ impl<'a> SelectedSites<'a> {
         Ok(())
     }
 
+    /// Gives the space of those in the file back.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] on the file.
+    pub(crate) fn free(self) -> Result<()> {
+        let Some(store) = self.store else { return Ok(()) };
+        self.stored.into_iter().try_for_each(|stored| stored.free(store))
+    }
+
     /// Returns the number of points.
     pub fn count(&self) -> u64 {
         self.cells.count() + self.stored.iter().map(StoredSites::count).sum::<u64>()

@@ -31,6 +31,12 @@ struct Page {
     count: u32,
 }
 
+impl Page {
+    fn bytes(&self) -> u64 {
+        u64::from(self.count) * size_of::<[i32; 3]>() as u64
+    }
+}
+
 impl StoredSites {
     /// Puts points at the end of a file, where neighbours in it should be neighbours in the plane.
     ///
@@ -61,6 +67,15 @@ impl StoredSites {
     /// Returns the bytes of memory that the boxes take.
     pub(crate) fn bytes(&self) -> u64 {
         (self.pages.capacity() * size_of::<Page>()) as u64
+    }
+
+    /// Gives the space of the points in the file back.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`].
+    pub(crate) fn free(self, store: &dyn SelectionStore) -> Result<()> {
+        let pages = self.pages.chunk_by(|page, next| page.at + page.bytes() == next.at);
+        pages.into_iter().try_for_each(|pages| store.free(pages[0].at, pages.iter().map(Page::bytes).sum()))
     }
 
     /// Returns the number of points in the pages that meet an area, or are near it.

@@ -2,8 +2,9 @@
 
 use crate::error_bound::RoundBound;
 use crate::memory::BlockMemory;
-use crate::rounds::BlockState;
+use crate::rounds::{BlockState, Rounds};
 use crate::sample::{Sample, very_far_above};
+use crate::selected_sites::SelectedSites;
 use crate::*;
 use delaunay::geometry::predicates::orient2d;
 use delaunay::geometry::{Bounds, Site};
@@ -367,8 +368,8 @@ fn a_crowd_does_not_depend_on_blocks() {
 fn regions_depend_on_the_points_alone() {
     let sizes = crate::regions::RegionSizes { undivided: 1_600, points: 100 };
     let mut clouds = vec![hills(3_000)];
-    // A dense cluster, whose regions are divided again, and a line far away.
-    clouds.push((0..4_000).map(|i| [i % 63, i / 63, (i % 63) * (i / 63) % 29]).collect());
+    // A dense cluster about a corner of regions, which are divided again, and a line far away.
+    clouds.push((0..8_000).map(|i| [i % 90 - 45, i / 90 - 44, (i % 90) * (i / 90) % 29]).collect());
     clouds[1].extend((0..50).map(|i| [40_000 + 100 * i, 90_000, i % 7]));
     for points in clouds {
         let bound = ErrorBound::new(12, 1);
@@ -381,6 +382,7 @@ fn regions_depend_on_the_points_alone() {
             let bounds = bounds_of(&points);
             let found = crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap();
             let all: BTreeSet<_> = found.sites.within(bounds).unwrap().into_iter().collect();
+            assert_eq!(all.len() as u64, found.figures.selected, "some are selected twice");
             holds_the_others(&all, &points, &found.holding);
             let mut all: Vec<_> = all.into_iter().map(back).collect();
             all.sort_unstable();
@@ -400,14 +402,41 @@ fn regions_depend_on_the_points_alone() {
     }
 }
 
-/// Of points on one line all are selected.
 #[test]
-fn points_on_a_line_have_no_strips() {
+fn of_points_on_a_line_in_regions_all_are_selected() {
     let points: Vec<[i32; 3]> = (0..2_000).map(|i| [3 * i, 7 * i, i % 5]).collect();
     let sizes = crate::regions::RegionSizes { undivided: 1_600, points: 100 };
     let cloud = Cloud::new(&points, &[], 700, AMPLE);
     let found = crate::select::select_by_regions(&cloud, ErrorBound::new(12, 1), sizes, None).unwrap();
     assert_eq!(found.figures.selected, 2_000);
+}
+
+/// The rounds over the whole cloud have little left to do after those along the borders of its regions.
+#[test]
+fn strips_leave_little_to_the_whole_cloud() {
+    let (points, bound) = (hills(20_000), ErrorBound::new(12, 1));
+    let (bounds, hull) = (bounds_of(&points), crate::hull::hull_corners(points.clone()));
+    let sizes = crate::regions::RegionSizes { undivided: 10_000, points: 1_000 };
+    let cloud = Cloud::new(&points, &[], 2_000, AMPLE);
+    let states = || cloud.blocks.iter().map(|block| BlockState::of(&block.points)).collect();
+    let memory = || BlockMemory::new(AMPLE);
+    let division = crate::regions::divide(&cloud, states(), &memory(), bounds, 20_000, sizes, None).unwrap();
+    let mut selected = SelectedSites::none(bounds, 20_000, None, u64::MAX);
+    for region in &division.regions {
+        let of_region = crate::select::select_by_regions(region, bound, sizes, None).unwrap();
+        selected.add(of_region.sites.within(region.bounds).unwrap()).unwrap();
+    }
+    let left = |selected: &SelectedSites| {
+        let mut rounds = Rounds::new(&cloud, states(), bounds, memory());
+        rounds.add(selected.within(bounds).unwrap()).unwrap();
+        rounds.select_more(hull.clone(), bound).unwrap().0.len()
+    };
+    let without = left(&selected);
+    for strips in &division.strips {
+        selected.add(crate::select::select_beside(strips, &selected, &hull, bound).unwrap().0).unwrap();
+    }
+    let with = left(&selected);
+    assert!(with <= without / 10 && without > 20, "{with} instead of {without}");
 }
 
 /// Strips along the borders of regions have all points near these, once, and no others.

@@ -1,4 +1,4 @@
-//! Faults on purpose: tests kill the process at places where a kill could do harm, let reads fail, and have every change of a file
+//! Faults on purpose: tests kill or stop the process at places where a kill could do harm, let reads fail, and have every change of a file
 //! written down. CONTRIBUTING.md says how.
 //!
 //! A process looks for them only after [`allow`], which the program calls if it is built with the feature `fault-injection`. In all others
