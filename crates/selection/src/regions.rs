@@ -83,10 +83,10 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
     let mut blocks = Vec::with_capacity(found.len());
     for (block, (state, shares)) in found.into_iter().enumerate() {
         blocks.push(state);
-        for (cell, share) in shares {
-            let (bounds, count, of_region) = regions.entry(cell).or_insert((share.0, 0, Vec::new()));
-            *bounds = bounds.union(share.0);
-            *count += share.1;
+        for (cell, (share, points)) in shares {
+            let (bounds, count, of_region) = regions.entry(cell).or_insert((share, 0, Vec::new()));
+            *bounds = bounds.union(share);
+            *count += points;
             of_region.push(block);
         }
     }
@@ -105,7 +105,7 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
 }
 
 /// Returns the strips along the borders of these cells that may have points of `blocks`, all of which lie in `bounds`. There are none at the corners
-/// of crowded cells: what is selected around these strips would not fit in the memory.
+/// of crowded cells: what is selected around these strips may not fit in the memory.
 fn strips<'a, E>(
     source: &'a dyn PointSource<Error = E>,
     blocks: &[BlockState],
