@@ -76,10 +76,10 @@ impl LevelSizes {
         self.memory / (5 * BYTES_PER_LEVEL_VERTEX)
     }
 
-    /// Returns about how many triangles a tile gets whose children together have `triangles`. Vertices along the borders come on top
-    /// of them, so it is less than a quarter.
+    /// Returns about how many triangles a tile gets whose children together have `triangles`. Skirts and vertices along the borders come on top
+    /// of them, so it is less than a fifth.
     pub(crate) fn target(self, triangles: usize) -> usize {
-        (triangles / 16 * 3).min((2 * self.sites as usize).max(triangles / 16)).max(1)
+        (triangles / 40 * 7).min((2 * self.sites as usize).max(triangles / 16)).max(1)
     }
 }
 
