@@ -91,12 +91,6 @@ impl Proposal {
     }
 }
 
-/// Returns the distance in units of [`VerticalError::fixed`] above which a point is selected whatever is beside it. Four times the bound takes
-/// 1 % more points than never, on ground and on woods, and half the time; twice the bound takes 5 to 8 % more.
-pub(crate) fn far_above(bound: ErrorBound) -> u64 {
-    4 * bound.fixed()
-}
-
 /// The worst point that a block has of a triangle about which other blocks may know more.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SharedCandidate {
@@ -304,7 +298,6 @@ impl Block {
 
     /// Proposes points to select.
     pub(crate) fn propose(&mut self, bound: &RoundBound) -> Proposal {
-        let far = far_above(bound.usual);
         for index in 0..self.mesh.changed.len() {
             let t = self.mesh.changed[index] as usize;
             let excess = self.mesh.excess_over(t, bound);
@@ -320,7 +313,7 @@ impl Block {
         self.mesh.changed.clear();
         let mut proposal = Proposal::default();
         for t in triangles {
-            if self.mesh.held[t as usize].excess > 0 && self.propose_of(t as usize, far, &mut proposal) {
+            if self.mesh.held[t as usize].excess > 0 && self.propose_of(t as usize, bound.far, &mut proposal) {
                 self.shared.push(t);
             }
         }

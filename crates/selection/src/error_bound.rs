@@ -43,16 +43,27 @@ impl ErrorBound {
 /// The bound in a round: one for most triangles, and another for those of some areas.
 #[derive(Clone, Debug)]
 pub(crate) struct RoundBound {
-    pub(crate) usual: ErrorBound,
+    usual: ErrorBound,
     other: ErrorBound,
     /// Twice the areas of triangles with the other bound, in square lattice steps.
     with_other: Range<u64>,
+    /// The distance in units of [`VerticalError::fixed`] above which a point is selected whatever is beside it.
+    pub(crate) far: u64,
 }
 
 impl RoundBound {
+    /// So many times the bound is far. That takes half the time of no exception, and 1 % more points on most ground and woods, but a fifth more
+    /// where walls are; twice the bound takes 5 to 8 % more on ground.
+    const FAR: u64 = 4;
+
     /// Returns one bound for all triangles.
     pub(crate) fn everywhere(bound: ErrorBound) -> RoundBound {
-        RoundBound { usual: bound, other: bound, with_other: 0..0 }
+        RoundBound { usual: bound, other: bound, with_other: 0..0, far: RoundBound::FAR * bound.fixed() }
+    }
+
+    /// Returns the same with no point so far away that it is selected whatever is beside it.
+    pub(crate) fn without_exception(self) -> RoundBound {
+        RoundBound { far: u64::MAX, ..self }
     }
 
     /// Returns the same with another bound for triangles of these areas in square lattice steps.

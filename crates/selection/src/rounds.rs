@@ -5,14 +5,14 @@
 //! A triangle that reaches out of a block may hold points of others: their worst points are compared.
 
 use crate::area::area_of;
-use crate::block::{Block, BlockErrors, Proposal, SharedCandidate, far_above};
+use crate::block::{Block, BlockErrors, Proposal, SharedCandidate};
 use crate::concern::Concern;
 use crate::error_bound::{ErrorBound, RoundBound};
 use crate::held_points::HeldPoints;
 use crate::memory::BlockMemory;
 use crate::mesh_of_points::TriangleKey;
 use crate::near_points::PointsByPlace;
-use crate::sample::{Sample, very_far_above};
+use crate::sample::{Sample, Samples, very_far_above};
 use crate::selected_sites::SelectedSites;
 use crate::source::{BYTES_PER_LISTED, BlockPoints, PointSource};
 use crate::swap::{Place, SwapSpace, SwappedBlock};
@@ -150,7 +150,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         &self.selected
     }
 
-    /// Does all rounds, over these samples one after the other, and returns what they select. Of points on one line that is all of them. `outline` are
+    /// Does all rounds, over `samples` one after the other, and returns what they select. Of points on one line that is all of them. `outline` are
     /// the corners of the hull of the cloud; so many `rounds` have been done.
     ///
     /// # Errors
@@ -160,13 +160,13 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         outline: Vec<[i32; 3]>,
         rounds: u32,
         bound: ErrorBound,
-        samples: impl Iterator<Item = Sample>,
+        samples: Samples,
     ) -> Result<Selection<'a>, E> {
         (self.outline, self.figures.rounds) = (outline, rounds);
         if self.outline.len() < 3 {
             return self.select_all();
         }
-        for (number, sample) in samples.enumerate() {
+        for (number, sample) in samples.ladder(self.source.offset()).enumerate() {
             self.sample = sample;
             for state in &mut self.blocks {
                 state.get_mut().unwrap_or_else(PoisonError::into_inner).settled = None;
@@ -174,7 +174,8 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             if number > 0 {
                 self.add_beyond(very_far_above(bound))?;
             }
-            self.down_to(&sample.bound(bound, self.figures.points, self.area), |_| ())?;
+            let bound = sample.bound(bound, self.figures.points, self.area);
+            self.down_to(&if samples == Samples::None { bound.without_exception() } else { bound }, |_| ())?;
         }
         self.finish()
     }
@@ -212,7 +213,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             let proposals =
                 (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|block| self.proposal_of(block, bound));
             let proposals = proposals.collect::<Result<Vec<_>, E>>()?;
-            let found = accepted(&proposals, far_above(bound.usual)).inspect(|found| take(*found));
+            let found = accepted(&proposals, bound.far).inspect(|found| take(*found));
             if !self.add_round(found)? {
                 return Ok(());
             }

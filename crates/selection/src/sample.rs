@@ -2,6 +2,25 @@
 
 use crate::error_bound::{ErrorBound, RoundBound};
 
+/// Which samples the rounds go over before all points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Samples {
+    /// None, and no point is selected beside a worse one: as few points are selected as rounds can, in more of them.
+    None,
+    /// Each a part of the next.
+    Growing,
+    /// None, because most points are selected already.
+    Done,
+}
+
+impl Samples {
+    /// Returns the samples from the smallest on to all points, on a lattice with this offset.
+    pub(crate) fn ladder(self, offset: [i64; 2]) -> impl Iterator<Item = Sample> {
+        let steps = if self == Samples::Growing { Sample::FIRST / Sample::STEP } else { 0 };
+        (0..=steps).rev().map(move |step| Sample { halvings: step * Sample::STEP, offset })
+    }
+}
+
 /// Some of the points of a cloud: one of so many, chosen by a hash of the place.
 ///
 /// Rounds go over a small sample first. What that has selected is where the rounds over a greater one begin, so that most points are looked at in
@@ -28,12 +47,6 @@ impl Sample {
     /// Returns all points, on a lattice with this offset.
     pub(crate) fn all(offset: [i64; 2]) -> Sample {
         Sample { halvings: 0, offset }
-    }
-
-    /// Returns the samples from the smallest on to all points.
-    pub(crate) fn ladder(offset: [i64; 2]) -> impl Iterator<Item = Sample> {
-        let steps = Sample::FIRST / Sample::STEP;
-        (0..=steps).rev().map(move |step| Sample { halvings: step * Sample::STEP, offset })
     }
 
     /// Returns the bound for rounds over the sample of a cloud that has `points` points on an `area` in square lattice steps.
@@ -83,14 +96,14 @@ mod tests {
         let of = |sample: Sample, moved: i32| -> Vec<usize> {
             (0..points.len()).filter(|&i| sample.has([points[i][0] - moved, points[i][1], 0])).collect()
         };
-        let samples: Vec<Vec<usize>> = Sample::ladder([0; 2]).map(|sample| of(sample, 0)).collect();
+        let samples: Vec<Vec<usize>> = Samples::Growing.ladder([0; 2]).map(|sample| of(sample, 0)).collect();
         let share = |sample: &Vec<usize>| sample.len() as f64 / points.len() as f64;
         for (pair, wanted) in samples.windows(2).zip([1.0 / 16.0, 1.0 / 4.0]) {
             assert!(pair[0].iter().all(|i| pair[1].binary_search(i).is_ok()));
             assert!((share(&pair[0]) / wanted - 1.0).abs() < 0.1, "{}", share(&pair[0]));
         }
         assert_eq!(samples.last().map(Vec::len), Some(points.len()));
-        let moved: Vec<Vec<usize>> = Sample::ladder([777, 0]).map(|sample| of(sample, 777)).collect();
+        let moved: Vec<Vec<usize>> = Samples::Growing.ladder([777, 0]).map(|sample| of(sample, 777)).collect();
         assert_eq!(moved, samples);
     }
 
@@ -102,7 +115,7 @@ mod tests {
             let error = VerticalError { numerator: 20 * u128::from(area), area };
             sample.bound(bound, 1000, 10_000.0).excess(error) > 0
         };
-        let [first, last, all] = Sample::ladder([0; 2]).collect::<Vec<_>>().try_into().unwrap();
+        let [first, last, all] = Samples::Growing.ladder([0; 2]).collect::<Vec<_>>().try_into().unwrap();
         let areas = [1279, 1280, 20_479, 20_480];
         assert_eq!(areas.map(|area| exceeds(last, area)), [false, true, true, false]);
         assert_eq!(areas.map(|area| exceeds(first, 8 * area)), [false, true, true, false]);

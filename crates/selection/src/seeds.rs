@@ -4,12 +4,15 @@
 use crate::hull::hull_corners;
 use crate::lattice_cells::LatticeCells;
 use crate::outline::{MarkedCells, Outline};
+use crate::sample::Samples;
 use delaunay::geometry::Bounds;
 use std::collections::HashMap;
 
-/// A cell has so many points, more or less. With fewer, seeds are a burden where few points are wanted in the end; with more, the first rounds
-/// take longer.
+/// A cell has so many points, or up to four times as many. With fewer, seeds are a burden where few points are wanted in the end; with more, the first
+/// rounds take longer.
 const POINTS_PER_CELL: u64 = 16_000;
+/// The same without samples.
+const POINTS_PER_CELL_UNSAMPLED: u64 = 64_000;
 
 /// Seeds of a block, or of several.
 #[derive(Clone, Debug)]
@@ -22,9 +25,17 @@ pub(crate) struct Seeds {
 }
 
 impl Seeds {
-    /// Returns no seeds for `points` points in `bounds`, on a lattice with this `offset`. The outline is looked for in `cells_of_outline`.
-    pub(crate) fn none(bounds: Bounds<2>, points: u64, offset: [i64; 2], cells_of_outline: &MarkedCells) -> Seeds {
-        let cells = LatticeCells::new(bounds, points, POINTS_PER_CELL, offset);
+    /// Returns no seeds for rounds with these `samples` of `points` points in `bounds`, on a lattice with this `offset`. The outline is looked for in
+    /// `cells_of_outline`.
+    pub(crate) fn none(
+        samples: Samples,
+        bounds: Bounds<2>,
+        points: u64,
+        offset: [i64; 2],
+        cells_of_outline: &MarkedCells,
+    ) -> Seeds {
+        let wanted = if samples == Samples::None { POINTS_PER_CELL_UNSAMPLED } else { POINTS_PER_CELL };
+        let cells = LatticeCells::new(bounds, points, wanted, offset);
         let outline = Outline::none(cells_of_outline);
         Seeds { cells, hull: Vec::new(), by_cell: HashMap::new(), outline, fixed: Vec::new() }
     }

@@ -6,7 +6,7 @@ use crate::memory::BlockMemory;
 use crate::outline::MarkedCells;
 use crate::regions::{Division, Region, RegionSizes, divide};
 use crate::rounds::{BlockState, Rounds, Selection};
-use crate::sample::Sample;
+use crate::sample::Samples;
 use crate::seeds::Seeds;
 use crate::selected_sites::SelectedSites;
 use crate::source::{BYTES_PER_LISTED, BlockPoints, PointSource};
@@ -38,7 +38,8 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
     let points = blocks.iter().map(|state| state.points).sum();
     if points <= sizes.undivided {
         let cells = MarkedCells::none(bounds, points, source.offset());
-        let none = Seeds::none(bounds, points, source.offset(), bays.unwrap_or(&cells));
+        let samples = if points <= sizes.unsampled { Samples::None } else { Samples::Growing };
+        let none = Seeds::none(samples, bounds, points, source.offset(), bays.unwrap_or(&cells));
         let seeds = seeds_of(source, &blocks, none)?;
         let own;
         let bays = match bays {
@@ -51,7 +52,7 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
         let hull = seeds.hull().to_vec();
         let mut rounds = Rounds::new(source, blocks, bounds, memory);
         rounds.add(seeds.into_points(bays))?;
-        return rounds.run(hull, 0, bound, Sample::ladder(source.offset()));
+        return rounds.run(hull, 0, bound, samples);
     }
     let cells = bays.is_none().then(|| MarkedCells::none(bounds, points, source.offset()));
     let Division { bays: own, blocks, regions, strips } =
@@ -59,6 +60,7 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
     let bays = bays.or(own.as_ref());
     let mut rounds = Rounds::new(source, blocks, bounds, memory);
     let (mut corners, mut most, mut most_of_strips) = (Vec::new(), 0, 0);
+    let sizes = RegionSizes { unsampled: 0, ..sizes };
     for region in &regions {
         let region = region.after(rounds.selected().bytes());
         let of_region = select_by_regions(&region, bound, sizes, bays)?;
@@ -76,7 +78,7 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
             rounds.add(newly)?;
         }
     }
-    rounds.run(hull, most + most_of_strips, bound, std::iter::once(Sample::all(source.offset())))
+    rounds.run(hull, most + most_of_strips, bound, Samples::Done)
 }
 
 /// Selects points of strips beside those that are `selected` around them, and returns them with the number of rounds. The `hull` is that of the

@@ -2,8 +2,9 @@
 
 use crate::error_bound::RoundBound;
 use crate::memory::BlockMemory;
+use crate::regions::RegionSizes;
 use crate::rounds::{BlockState, Rounds};
-use crate::sample::{Sample, very_far_above};
+use crate::sample::{Sample, Samples, very_far_above};
 use crate::selected_sites::SelectedSites;
 use crate::*;
 use delaunay::geometry::predicates::orient2d;
@@ -117,9 +118,20 @@ fn selected(
     bound: ErrorBound,
     memory: u64,
 ) -> (Vec<[i32; 3]>, Figures) {
+    selected_with(RegionSizes::USUAL, points, fixed, side, bound, memory)
+}
+
+fn selected_with(
+    sizes: RegionSizes,
+    points: &[[i32; 3]],
+    fixed: &[[i32; 3]],
+    side: i32,
+    bound: ErrorBound,
+    memory: u64,
+) -> (Vec<[i32; 3]>, Figures) {
     let bounds = bounds_of(points);
     let cloud = Cloud::new(points, fixed, side, memory);
-    let Selection { sites, figures, holding } = select(&cloud, bound).unwrap();
+    let Selection { sites, figures, holding } = crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap();
     let mut all: Vec<_> = sites.within(bounds).unwrap();
     holds_the_others(&all.iter().copied().collect::<BTreeSet<_>>(), points, &holding);
     all.sort_unstable();
@@ -143,16 +155,18 @@ fn holds_the_others(selected: &BTreeSet<[i32; 3]>, points: &[[i32; 3]], holding:
 }
 
 /// Does rounds on all points of one sample after the other at once, each from nothing, from these seeds on.
-fn plain_rounds(points: &[[i32; 3]], seeds: Vec<[i32; 3]>, bound: ErrorBound) -> Vec<[i32; 3]> {
+fn plain_rounds(samples: Samples, points: &[[i32; 3]], seeds: Vec<[i32; 3]>, bound: ErrorBound) -> Vec<[i32; 3]> {
     let mut selected: BTreeSet<[i32; 3]> = seeds.into_iter().collect();
     let (count, area) = (points.len() as u64, crate::area::area_of(bounds_of(points)));
-    for (number, sample) in Sample::ladder([0; 2]).enumerate() {
+    for (number, sample) in samples.ladder([0; 2]).enumerate() {
         let points: Vec<[i32; 3]> = points.iter().copied().filter(|&p| sample.has(p)).collect();
         if number > 0 {
             let beyond = beyond(&points, &selected, very_far_above(bound));
             selected.extend(beyond);
         }
-        rounds_over(&points, &mut selected, &sample.bound(bound, count, area));
+        let bound = sample.bound(bound, count, area);
+        let bound = if samples == Samples::None { bound.without_exception() } else { bound };
+        rounds_over(&points, &mut selected, &bound);
     }
     selected.into_iter().collect()
 }
@@ -178,7 +192,7 @@ fn rounds_over(points: &[[i32; 3]], selected: &mut BTreeSet<[i32; 3]>, bound: &R
         let accepted = worst.iter().filter(|(triangle, own)| {
             let is_outdone_by =
                 |(other, candidate): &WorstPoint| beside(triangle, other) && rank(*candidate) > rank(*own);
-            own.0 > 4 * bound.usual.fixed() || !worst.iter().any(is_outdone_by)
+            own.0 > bound.far || !worst.iter().any(is_outdone_by)
         });
         let accepted: Vec<[i32; 3]> = accepted.map(|(_, (_, p))| *p).collect();
         if accepted.is_empty() {
@@ -231,6 +245,7 @@ proptest! {
         shape in 0..6,
         bound in prop::sample::select(vec![(0u64, 1u32), (1, 3), (1, 1), (5, 2), (40, 1)]),
         side in prop::sample::select(vec![3, 7, 17, 701, 2500, 100_000]),
+        samples in prop::sample::select(vec![Samples::None, Samples::Growing]),
     ) {
         let side = side.max(reach / 12);
         let points = cloud(reach, places, |x, y| match shape {
@@ -242,8 +257,9 @@ proptest! {
             _ => (x / 3 * 7 + y / 2 * 3) % 11,
         });
         let bound = ErrorBound::new(bound.0, bound.1);
-        let (found, figures) = selected(&points, &[], side, bound, AMPLE);
-        let (again, _) = selected(&points, &[], 100_000, bound, 0);
+        let sizes = RegionSizes { unsampled: if samples == Samples::None { u64::MAX } else { 0 }, ..RegionSizes::USUAL };
+        let (found, figures) = selected_with(sizes, &points, &[], side, bound, AMPLE);
+        let (again, _) = selected_with(sizes, &points, &[], 100_000, bound, 0);
         prop_assert_eq!(&found, &again);
         prop_assert_eq!(found.len() as u64, figures.selected);
         // Every point is within the bound.
@@ -251,10 +267,10 @@ proptest! {
         prop_assert_eq!(worst_points(&points, &chosen, &RoundBound::everywhere(bound)), Vec::new());
         // Round by round the plain way.
         let cells = crate::outline::MarkedCells::none(bounds_of(&points), points.len() as u64, [0; 2]);
-        let mut seeds = crate::seeds::Seeds::none(bounds_of(&points), points.len() as u64, [0; 2], &cells);
+        let mut seeds = crate::seeds::Seeds::none(samples, bounds_of(&points), points.len() as u64, [0; 2], &cells);
         seeds.add(&points, &[]);
         let bays = seeds.bays(cells);
-        prop_assert_eq!(found, plain_rounds(&points, seeds.into_points(&bays), bound));
+        prop_assert_eq!(found, plain_rounds(samples, &points, seeds.into_points(&bays), bound));
     }
 }
 
@@ -322,9 +338,12 @@ fn rounds_select_about_as_many_points_as_greedy_insertion() {
         let all = crate::near_points::PointsByPlace::of(&points, bounds, whole);
         let block = crate::block::Block::new(all, bounds, whole, &known, &hull, triangulated_sites).unwrap();
         let greedy = crate::block::greedy_insertion(block, &mut known, bound);
-        let (found, figures) = selected(&points, &[], 4_000, bound, AMPLE);
-        assert!(greedy > 40 && found.len() as u64 * 100 <= greedy * 108, "{steps}: {} and {greedy}", found.len());
-        assert!(figures.rounds > 2);
+        for unsampled in [0, u64::MAX] {
+            let sizes = RegionSizes { unsampled, ..RegionSizes::USUAL };
+            let (found, figures) = selected_with(sizes, &points, &[], 4_000, bound, AMPLE);
+            assert!(greedy > 40 && found.len() as u64 * 100 <= greedy * 108, "{steps}: {} and {greedy}", found.len());
+            assert!(figures.rounds > 2);
+        }
     }
 }
 
@@ -366,7 +385,7 @@ fn a_crowd_does_not_depend_on_blocks() {
 /// With small regions: every point is within the bound, and nothing depends on the blocks, or on where the lattice begins.
 #[test]
 fn regions_depend_on_the_points_alone() {
-    let sizes = crate::regions::RegionSizes { undivided: 1_600, points: 100 };
+    let sizes = RegionSizes { unsampled: 1_000, undivided: 1_600, points: 100 };
     let mut clouds = vec![hills(3_000)];
     // A dense cluster about a corner of regions, which are divided again, and a line far away.
     clouds.push((0..8_000).map(|i| [i % 90 - 45, i / 90 - 44, (i % 90) * (i / 90) % 29]).collect());
@@ -405,7 +424,7 @@ fn regions_depend_on_the_points_alone() {
 #[test]
 fn of_points_on_a_line_in_regions_all_are_selected() {
     let points: Vec<[i32; 3]> = (0..2_000).map(|i| [3 * i, 7 * i, i % 5]).collect();
-    let sizes = crate::regions::RegionSizes { undivided: 1_600, points: 100 };
+    let sizes = RegionSizes { unsampled: 1_000, undivided: 1_600, points: 100 };
     let cloud = Cloud::new(&points, &[], 700, AMPLE);
     let found = crate::select::select_by_regions(&cloud, ErrorBound::new(12, 1), sizes, None).unwrap();
     assert_eq!(found.figures.selected, 2_000);
@@ -416,7 +435,7 @@ fn of_points_on_a_line_in_regions_all_are_selected() {
 fn strips_leave_little_to_the_whole_cloud() {
     let (points, bound) = (hills(20_000), ErrorBound::new(12, 1));
     let (bounds, hull) = (bounds_of(&points), crate::hull::hull_corners(points.clone()));
-    let sizes = crate::regions::RegionSizes { undivided: 10_000, points: 1_000 };
+    let sizes = RegionSizes { unsampled: 1_000, undivided: 10_000, points: 1_000 };
     let cloud = Cloud::new(&points, &[], 2_000, AMPLE);
     let states = || cloud.blocks.iter().map(|block| BlockState::of(&block.points)).collect();
     let memory = || BlockMemory::new(AMPLE);
@@ -446,7 +465,7 @@ fn strips_lie_along_the_borders_of_regions() {
     for offset in [[0; 2], [12_345, -999]] {
         let mut cloud = Cloud::new(&points, &[], 23, AMPLE);
         cloud.offset = offset;
-        let sizes = crate::regions::RegionSizes { undivided: 20_000, points: 1_000 };
+        let sizes = RegionSizes { unsampled: 1_000, undivided: 20_000, points: 1_000 };
         let blocks = cloud.blocks.iter().map(|block| BlockState::of(&block.points)).collect();
         let (memory, bounds) = (BlockMemory::new(AMPLE), bounds_of(&points));
         let division = crate::regions::divide(&cloud, blocks, &memory, bounds, 40_000, sizes, None).unwrap();
@@ -474,7 +493,7 @@ fn bays_are_those_of_the_whole_cloud() {
     let shore = |along: i32| if along % 128 < 64 { 200 } else { 180 };
     let all = (0..600).flat_map(|y| (0..600).map(move |x| [x, y, 7]));
     let points: Vec<[i32; 3]> = all.filter(|[x, y, _]| *x < shore(*y) || *y < shore(*x)).collect();
-    let sizes = crate::regions::RegionSizes { undivided: 160_000, points: 10_000 };
+    let sizes = RegionSizes { unsampled: 1_000, undivided: 160_000, points: 10_000 };
     let cloud = Cloud::new(&points, &[], 90, AMPLE);
     let found = crate::select::select_by_regions(&cloud, ErrorBound::new(1, 1), sizes, None).unwrap();
     let found = found.sites.within(bounds_of(&points)).unwrap();
