@@ -557,8 +557,9 @@ pub(crate) fn greedy_insertion(mut block: Block, selected: &mut SelectedSites, b
                 heap.push((excess, Reverse(block.points[worst as usize]), t, worst));
             }
         }
-        let Some((_, Reverse(point), t, worst)) = heap.pop() else { return count };
-        if block.mesh.held[t as usize].worst != worst {
+        let Some((excess, Reverse(point), t, worst)) = heap.pop() else { return count };
+        let is_stale = block.mesh.excess_over(t as usize, &RoundBound::everywhere(bound)) != excess;
+        if is_stale || block.mesh.held[t as usize].worst != worst {
             continue;
         }
         block.insert(point, t);
