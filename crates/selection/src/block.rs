@@ -70,11 +70,11 @@ fn surroundings(bounds: Bounds<2>, selected: &SelectedSites) -> Bounds<2> {
     widened(sides.find(|&side| selected.near(widened(side)) <= most).unwrap_or(0))
 }
 
-/// What a block proposes to select: the worst points of triangles where they exceed the bound by far, or exceed it and are further from their
-/// triangle than the worst points of the three triangles beside it are from theirs.
+/// What a block proposes to select: the worst points of triangles where they exceed the bound and are further from their triangle than the worst
+/// points of the three triangles beside it are from theirs, or, in clouds with samples, exceed it by far.
 ///
 /// If the worst points of all triangles joined, up to a third of them would be superfluous in the end: another nearby serves as well. Where the
-/// triangles are not nearly the last ones, that does no harm, and saves rounds.
+/// triangles are not nearly the last ones, that saves rounds, and does little harm except where walls are.
 #[derive(Debug, Default)]
 pub(crate) struct Proposal {
     /// The points about which the block alone decides.

@@ -52,8 +52,8 @@ pub(crate) struct RoundBound {
 }
 
 impl RoundBound {
-    /// So many times the bound is far. That takes half the time of no exception, and 1 % more points on most ground and woods, but a fifth more
-    /// where walls are; twice the bound takes 5 to 8 % more on ground.
+    /// So many times the bound is far. With this exception, large clouds take half the time, and 1 % more points on most ground and woods. Where walls
+    /// are, it and the samples take up to a fifth more. Twice the bound takes 5 to 8 % more on ground.
     const FAR: u64 = 4;
 
     /// Returns one bound for all triangles.
@@ -138,7 +138,7 @@ impl Candidate {
         (self.numerator, Reverse(self.point)) > (other.numerator, Reverse(other.point))
     }
 
-    /// Tells whether it is selected beside the worst point of another triangle: its distance is greater, or `far` more than the bound. Equal
+    /// Tells whether it is selected beside the worst point of another triangle: its distance is greater than that one's, or greater than `far`. Equal
     /// ones are ordered likewise.
     #[inline]
     pub(crate) fn stands_beside(&self, other: &Candidate, far: u64) -> bool {

@@ -2,7 +2,8 @@
 //!
 //! It is greedy insertion (Garland and Heckbert 1995, "Fast Polygonal Approximation of Terrains and Height Fields") in rounds. A round
 //! triangulates what is selected, and selects the worst points of the triangles where they exceed the bound, but for those that a worse one beside
-//! them may make superfluous (`rounds.rs`). Rounds go over samples of the cloud first (`sample.rs`).
+//! them may make superfluous (`rounds.rs`). In clouds of more than a million points, rounds
+//! go over samples first (`sample.rs`).
 //!
 //! The canonical triangulation of a set of sites is unique, a round looks at nothing but a triangle, those beside it and the points in
 //! them, and all of its points join at once. Which points are in a sample goes by their places. So the selection depends on the points and the
@@ -39,7 +40,7 @@ mod tests;
 pub use error_bound::{ErrorBound, VerticalError};
 pub use held_points::HeldPoints;
 pub use rounds::{Figures, Selection};
-pub use select::select;
+pub use select::{select, select_like};
 pub use selected_sites::SelectedSites;
 pub use source::{BYTES_PER_POINT, BlockPoints, PointSource, SelectionStore};
 pub use swap::MOST_SWAPPED;

@@ -22,9 +22,9 @@ use std::sync::{Mutex, PoisonError};
 /// How clouds are divided.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RegionSizes {
-    /// Of clouds of at most so many points no samples are looked at first. They are not regions.
+    /// Clouds of at most so many points are selected from without samples. A region never is.
     pub(crate) unsampled: u64,
-    /// Clouds of at most so many points are not: at least 16 times as many as a region has, so that a region is a part of them.
+    /// Clouds of at most so many points are not divided: at least 16 times as many as a region has, so that a region is a part of them.
     pub(crate) undivided: u64,
     /// A region has at least so many points on average, and less than four times as many.
     pub(crate) points: u64,
@@ -32,8 +32,8 @@ pub(crate) struct RegionSizes {
 
 impl RegionSizes {
     /// The sizes of all jobs. Points at the borders of regions are superfluous in the end: with regions of a million to four million points,
-    /// some percent of the vertices. A region takes some hundred megabytes. Clouds without samples take up to half as long again to select from, and
-    /// up to a fifth fewer vertices.
+    /// some percent of the vertices. A region takes some hundred megabytes. Without samples, selecting takes up to half as long
+    /// again. It usually selects fewer vertices, up to a sixth fewer where walls are.
     pub(crate) const USUAL: RegionSizes = RegionSizes { unsampled: 1 << 20, undivided: 1 << 24, points: 1 << 20 };
 }
 

@@ -110,6 +110,8 @@ pub(crate) struct Rounds<'a, E> {
     area: f64,
     /// Whether the distances of all points are wanted in the end.
     wants_errors: bool,
+    /// Whether points have been selected from the regions of the cloud already.
+    is_after_regions: bool,
     figures: Figures,
 }
 
@@ -133,6 +135,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             sample: Sample::all(source.offset()),
             area: area_of(bounds),
             wants_errors: true,
+            is_after_regions: false,
             figures: Figures { points, ..Figures::default() },
         }
     }
@@ -163,6 +166,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         samples: Samples,
     ) -> Result<Selection<'a>, E> {
         (self.outline, self.figures.rounds) = (outline, rounds);
+        self.is_after_regions = samples == Samples::AfterRegions;
         if self.outline.len() < 3 {
             return self.select_all();
         }
@@ -174,8 +178,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             if number > 0 {
                 self.add_beyond(very_far_above(bound))?;
             }
-            let bound = sample.bound(bound, self.figures.points, self.area);
-            self.down_to(&if samples == Samples::None { bound.without_exception() } else { bound }, |_| ())?;
+            self.down_to(&samples.bound(sample.bound(bound, self.figures.points, self.area)), |_| ())?;
         }
         self.finish()
     }
@@ -243,7 +246,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         let proposal = block.propose(bound);
         self.memory.note_proposal(proposal.bytes());
         state.settled = block.settled_within();
-        if is_new && self.wants_errors && self.sample.is_all() && state.settled.is_some() {
+        if is_new && self.is_after_regions && state.settled.is_some() {
             // Most of these are far from the borders of regions, and not needed again.
             self.memory.note_block(state.points, block.sites(), block.bytes());
             state.errors = Some(self.errors_of(&block));

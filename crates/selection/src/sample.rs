@@ -2,15 +2,15 @@
 
 use crate::error_bound::{ErrorBound, RoundBound};
 
-/// Which samples the rounds go over before all points.
+/// Which samples the rounds go over before all points, and how strictly they select.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Samples {
-    /// None, and no point is selected beside a worse one: as few points are selected as rounds can, in more of them.
-    None,
-    /// Each a part of the next.
+    /// None, and no exception for far points: it takes more rounds and selects fewer points.
+    Unneeded,
+    /// Small ones first, each a part of the next.
     Growing,
-    /// None, because most points are selected already.
-    Done,
+    /// None: points have been selected from the regions of the cloud already.
+    AfterRegions,
 }
 
 impl Samples {
@@ -18,6 +18,11 @@ impl Samples {
     pub(crate) fn ladder(self, offset: [i64; 2]) -> impl Iterator<Item = Sample> {
         let steps = if self == Samples::Growing { Sample::FIRST / Sample::STEP } else { 0 };
         (0..=steps).rev().map(move |step| Sample { halvings: step * Sample::STEP, offset })
+    }
+
+    /// Returns the bound for rounds that go over these samples.
+    pub(crate) fn bound(self, bound: RoundBound) -> RoundBound {
+        if self == Samples::Unneeded { bound.without_exception() } else { bound }
     }
 }
 

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 /// A cell has so many points, or up to four times as many. With fewer, seeds are a burden where few points are wanted in the end; with more, the first
 /// rounds take longer.
 const POINTS_PER_CELL: u64 = 16_000;
-/// The same without samples.
+/// The same for clouds that are selected from without samples.
 const POINTS_PER_CELL_UNSAMPLED: u64 = 64_000;
 
 /// Seeds of a block, or of several.
@@ -34,7 +34,7 @@ impl Seeds {
         offset: [i64; 2],
         cells_of_outline: &MarkedCells,
     ) -> Seeds {
-        let wanted = if samples == Samples::None { POINTS_PER_CELL_UNSAMPLED } else { POINTS_PER_CELL };
+        let wanted = if samples == Samples::Unneeded { POINTS_PER_CELL_UNSAMPLED } else { POINTS_PER_CELL };
         let cells = LatticeCells::new(bounds, points, wanted, offset);
         let outline = Outline::none(cells_of_outline);
         Seeds { cells, hull: Vec::new(), by_cell: HashMap::new(), outline, fixed: Vec::new() }

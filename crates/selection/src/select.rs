@@ -23,6 +23,19 @@ pub fn select<S: PointSource>(source: &S, bound: ErrorBound) -> Result<Selection
     select_by_regions(source, bound, RegionSizes::USUAL, None)
 }
 
+/// As [`select`], for some points of a cloud that has `points_of_cloud`: the share that is selected is about that of the cloud.
+///
+/// # Errors
+/// Those of `source`.
+pub fn select_like<S: PointSource>(
+    source: &S,
+    points_of_cloud: u64,
+    bound: ErrorBound,
+) -> Result<Selection<'_>, S::Error> {
+    let unsampled = if points_of_cloud <= RegionSizes::USUAL.unsampled { u64::MAX } else { 0 };
+    select_by_regions(source, bound, RegionSizes { unsampled, ..RegionSizes::USUAL }, None)
+}
+
 /// As [`select`]. A cloud of many points is divided into regions by the lattice, and points are selected from each of these by itself first. The
 /// `bays` are those of the whole cloud, if this is a part of it.
 pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
@@ -38,7 +51,7 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
     let points = blocks.iter().map(|state| state.points).sum();
     if points <= sizes.undivided {
         let cells = MarkedCells::none(bounds, points, source.offset());
-        let samples = if points <= sizes.unsampled { Samples::None } else { Samples::Growing };
+        let samples = if points <= sizes.unsampled { Samples::Unneeded } else { Samples::Growing };
         let none = Seeds::none(samples, bounds, points, source.offset(), bays.unwrap_or(&cells));
         let seeds = seeds_of(source, &blocks, none)?;
         let own;
@@ -78,7 +91,7 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
             rounds.add(newly)?;
         }
     }
-    rounds.run(hull, most + most_of_strips, bound, Samples::Done)
+    rounds.run(hull, most + most_of_strips, bound, Samples::AfterRegions)
 }
 
 /// Selects points of strips beside those that are `selected` around them, and returns them with the number of rounds. The `hull` is that of the

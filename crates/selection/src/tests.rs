@@ -164,9 +164,7 @@ fn plain_rounds(samples: Samples, points: &[[i32; 3]], seeds: Vec<[i32; 3]>, bou
             let beyond = beyond(&points, &selected, very_far_above(bound));
             selected.extend(beyond);
         }
-        let bound = sample.bound(bound, count, area);
-        let bound = if samples == Samples::None { bound.without_exception() } else { bound };
-        rounds_over(&points, &mut selected, &bound);
+        rounds_over(&points, &mut selected, &samples.bound(sample.bound(bound, count, area)));
     }
     selected.into_iter().collect()
 }
@@ -245,7 +243,7 @@ proptest! {
         shape in 0..6,
         bound in prop::sample::select(vec![(0u64, 1u32), (1, 3), (1, 1), (5, 2), (40, 1)]),
         side in prop::sample::select(vec![3, 7, 17, 701, 2500, 100_000]),
-        samples in prop::sample::select(vec![Samples::None, Samples::Growing]),
+        samples in prop::sample::select(vec![Samples::Unneeded, Samples::Growing]),
     ) {
         let side = side.max(reach / 12);
         let points = cloud(reach, places, |x, y| match shape {
@@ -257,7 +255,7 @@ proptest! {
             _ => (x / 3 * 7 + y / 2 * 3) % 11,
         });
         let bound = ErrorBound::new(bound.0, bound.1);
-        let sizes = RegionSizes { unsampled: if samples == Samples::None { u64::MAX } else { 0 }, ..RegionSizes::USUAL };
+        let sizes = RegionSizes { unsampled: if samples == Samples::Unneeded { u64::MAX } else { 0 }, ..RegionSizes::USUAL };
         let (found, figures) = selected_with(sizes, &points, &[], side, bound, AMPLE);
         let (again, _) = selected_with(sizes, &points, &[], 100_000, bound, 0);
         prop_assert_eq!(&found, &again);
@@ -304,11 +302,14 @@ fn blocks_far_apart_agree() {
     }
     let points: Vec<[i32; 3]> = points.into_iter().map(|[x, y]| [x, y, hill(x, y)]).collect();
     let bound = ErrorBound::new(9, 2);
-    let whole = selected(&points, &[], 100_000_000, bound, AMPLE);
-    for (side, memory) in [(100, AMPLE), (333, 0), (400, SCARCE), (1000, AMPLE)] {
-        assert_eq!(selected(&points, &[], side, bound, memory), whole);
+    for unsampled in [0, u64::MAX] {
+        let sizes = RegionSizes { unsampled, ..RegionSizes::USUAL };
+        let whole = selected_with(sizes, &points, &[], 100_000_000, bound, AMPLE);
+        for (side, memory) in [(100, AMPLE), (333, 0), (400, SCARCE), (1000, AMPLE)] {
+            assert_eq!(selected_with(sizes, &points, &[], side, bound, memory), whole);
+        }
+        assert!(whole.1.greatest <= 9 << 19 && whole.0.len() > 1000 && whole.0.len() < points.len());
     }
-    assert!(whole.1.greatest <= 9 << 19 && whole.0.len() > 1000 && whole.0.len() < points.len());
 }
 
 /// Hills of several sizes, and roughness of a step or two.
@@ -376,17 +377,20 @@ fn a_crowd_does_not_depend_on_blocks() {
     let strip = (0..20_000).map(|i| [i * 499 + i % 7, 4_999_000 + i * 31 % 1_999, rough(i)]);
     let points: Vec<[i32; 3]> = spread.chain(strip).collect();
     let bound = ErrorBound::new(12, 1);
-    let one = selected(&points, &[], 100_000_000, bound, AMPLE);
-    assert!((5_000..21_000).contains(&one.0.len()), "{}", one.0.len());
-    for side in [625_000, 1_250_000, 5_000_000] {
-        assert!(selected(&points, &[], side, bound, AMPLE) == one, "blocks of {side}");
+    for unsampled in [0, u64::MAX] {
+        let sizes = RegionSizes { unsampled, ..RegionSizes::USUAL };
+        let one = selected_with(sizes, &points, &[], 100_000_000, bound, AMPLE);
+        assert!((5_000..21_000).contains(&one.0.len()), "{}", one.0.len());
+        for (side, memory) in [(625_000, AMPLE), (1_250_000, SCARCE), (5_000_000, AMPLE)] {
+            assert!(selected_with(sizes, &points, &[], side, bound, memory) == one, "blocks of {side}");
+        }
     }
 }
 
 /// With small regions: every point is within the bound, and nothing depends on the blocks, or on where the lattice begins.
 #[test]
 fn regions_depend_on_the_points_alone() {
-    let sizes = RegionSizes { unsampled: 1_000, undivided: 1_600, points: 100 };
+    let sizes = RegionSizes { unsampled: 0, undivided: 1_600, points: 100 };
     let mut clouds = vec![hills(3_000)];
     // A dense cluster about a corner of regions, which are divided again, and a line far away.
     clouds.push((0..8_000).map(|i| [i % 90 - 45, i / 90 - 44, (i % 90) * (i / 90) % 29]).collect());
@@ -425,7 +429,7 @@ fn regions_depend_on_the_points_alone() {
 #[test]
 fn of_points_on_a_line_in_regions_all_are_selected() {
     let points: Vec<[i32; 3]> = (0..2_000).map(|i| [3 * i, 7 * i, i % 5]).collect();
-    let sizes = RegionSizes { unsampled: 1_000, undivided: 1_600, points: 100 };
+    let sizes = RegionSizes { unsampled: 0, undivided: 1_600, points: 100 };
     let cloud = Cloud::new(&points, &[], 700, AMPLE);
     let found = crate::select::select_by_regions(&cloud, ErrorBound::new(12, 1), sizes, None).unwrap();
     assert_eq!(found.figures.selected, 2_000);
@@ -436,7 +440,7 @@ fn of_points_on_a_line_in_regions_all_are_selected() {
 fn strips_leave_little_to_the_whole_cloud() {
     let (points, bound) = (hills(20_000), ErrorBound::new(12, 1));
     let (bounds, hull) = (bounds_of(&points), crate::hull::hull_corners(points.clone()));
-    let sizes = RegionSizes { unsampled: 1_000, undivided: 10_000, points: 1_000 };
+    let sizes = RegionSizes { unsampled: 0, undivided: 10_000, points: 1_000 };
     let cloud = Cloud::new(&points, &[], 2_000, AMPLE);
     let states = || cloud.blocks.iter().map(|block| BlockState::of(&block.points)).collect();
     let memory = || BlockMemory::new(AMPLE);
@@ -466,7 +470,7 @@ fn strips_lie_along_the_borders_of_regions() {
     for offset in [[0; 2], [12_345, -999]] {
         let mut cloud = Cloud::new(&points, &[], 23, AMPLE);
         cloud.offset = offset;
-        let sizes = RegionSizes { unsampled: 1_000, undivided: 20_000, points: 1_000 };
+        let sizes = RegionSizes { unsampled: 0, undivided: 20_000, points: 1_000 };
         let blocks = cloud.blocks.iter().map(|block| BlockState::of(&block.points)).collect();
         let (memory, bounds) = (BlockMemory::new(AMPLE), bounds_of(&points));
         let division = crate::regions::divide(&cloud, blocks, &memory, bounds, 40_000, sizes, None).unwrap();
@@ -494,7 +498,7 @@ fn bays_are_those_of_the_whole_cloud() {
     let shore = |along: i32| if along % 128 < 64 { 200 } else { 180 };
     let all = (0..600).flat_map(|y| (0..600).map(move |x| [x, y, 7]));
     let points: Vec<[i32; 3]> = all.filter(|[x, y, _]| *x < shore(*y) || *y < shore(*x)).collect();
-    let sizes = RegionSizes { unsampled: 1_000, undivided: 160_000, points: 10_000 };
+    let sizes = RegionSizes { unsampled: 0, undivided: 160_000, points: 10_000 };
     let cloud = Cloud::new(&points, &[], 90, AMPLE);
     let found = crate::select::select_by_regions(&cloud, ErrorBound::new(1, 1), sizes, None).unwrap();
     let found = found.sites.within(bounds_of(&points)).unwrap();

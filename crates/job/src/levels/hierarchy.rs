@@ -79,7 +79,7 @@ impl LevelSizes {
     /// Returns about how many triangles a tile gets whose children together have `triangles`. Skirts and vertices along the borders come on top
     /// of them, so it is less than a fifth.
     pub(crate) fn target(self, triangles: usize) -> usize {
-        (triangles / 40 * 7).min((2 * self.sites as usize).max(triangles / 16)).max(1)
+        (triangles * 7 / 40).min((2 * self.sites as usize).max(triangles / 16)).max(1)
     }
 }
 

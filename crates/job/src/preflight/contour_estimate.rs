@@ -172,7 +172,7 @@ fn figures_of(plan: &Plan, options: &ContourOptions, points: &[[i32; 3]]) -> Res
     interrupt::check()?;
     let mut vertices = wanted_of(plan, points.to_vec())?;
     if let Some(bound) = error_bound(plan).map_err(config_error)? {
-        vertices = selected_points(&vertices, bound)?;
+        vertices = selected_points(&vertices, KeptPoints::by_headers(plan).0, bound)?;
     }
     let of_points = MeshFigures { points: points.len() as u64, ..MeshFigures::default() };
     let heights = vertices.iter().map(|vertex| vertex[2]);

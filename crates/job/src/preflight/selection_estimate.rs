@@ -7,7 +7,7 @@ use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::triangulation::canonical;
 use rayon::prelude::*;
-use selection::{BlockPoints, ErrorBound, PointSource, Selection, SelectionStore, select};
+use selection::{BlockPoints, ErrorBound, PointSource, Selection, SelectionStore, select_like};
 use sys::{Error, Result, interrupt};
 
 /// Returns about how many of `kept` points each of the `bounds`, in source units of height, selects. Where files are sorted otherwise than by
@@ -21,25 +21,25 @@ pub fn estimated_vertices(plan: &Plan, kept: u64, bounds: &[f64]) -> Result<Vec<
     let samples = samples.into_par_iter().map(|points| wanted_of(plan, points)).collect::<Result<Vec<_>>>()?;
     let estimate = |&units: &f64| {
         let bound = bound_in_steps(plan, units)?;
-        let selected = samples.par_iter().map(|points| selected_of(points, bound)).sum::<Result<u64>>()?;
+        let selected = samples.par_iter().map(|points| selected_of(points, kept, bound)).sum::<Result<u64>>()?;
         Ok((kept as f64 * selected as f64 / points.max(1) as f64).round() as u64)
     };
     bounds.iter().map(estimate).collect()
 }
 
-/// Returns how many of some points are selected.
-fn selected_of(points: &[[i32; 3]], bound: ErrorBound) -> Result<u64> {
-    Ok(select(&Sample(points), bound)?.figures.selected)
+/// Returns how many of some points are selected, of a cloud with `kept` points.
+fn selected_of(points: &[[i32; 3]], kept: u64, bound: ErrorBound) -> Result<u64> {
+    Ok(select_like(&Sample(points), kept, bound)?.figures.selected)
 }
 
-/// Returns those of some points that are selected.
+/// Returns those of some points that are selected, of a cloud with `kept` points.
 ///
 /// # Errors
 /// [`Error::Interrupted`].
-pub(crate) fn selected_points(points: &[[i32; 3]], bound: ErrorBound) -> Result<Vec<[i32; 3]>> {
+pub(crate) fn selected_points(points: &[[i32; 3]], kept: u64, bound: ErrorBound) -> Result<Vec<[i32; 3]>> {
     let Some(bounds) = Bounds::of_points(points.iter().map(|[x, y, _]| [*x, *y])) else { return Ok(Vec::new()) };
     let sample = Sample(points);
-    let Selection { sites, .. } = select(&sample, bound)?;
+    let Selection { sites, .. } = select_like(&sample, kept, bound)?;
     let mut selected = sites.within(bounds)?;
     selected.sort_unstable();
     Ok(selected)
