@@ -24,6 +24,22 @@ impl Concern {
         Concern { bounds, discs }
     }
 
+    /// Returns what holds this and another.
+    pub(crate) fn join(self, other: Concern) -> Concern {
+        Concern::new(self.bounds.union(other.bounds), [self.discs, other.discs].concat())
+    }
+
+    /// Tells whether it lies in a box that is a part of the box of `all` points, as far as there are points.
+    pub(crate) fn lies_in(&self, part: Bounds<2>, all: Bounds<2>) -> bool {
+        let boxes = self.discs.iter().map(Disc::bounds).chain([self.bounds]);
+        boxes.reduce(Bounds::union).is_some_and(|concern| {
+            (0..2).all(|axis| {
+                (part.min[axis] <= concern.min[axis] || part.min[axis] <= all.min[axis])
+                    && (concern.max[axis] <= part.max[axis] || all.max[axis] <= part.max[axis])
+            })
+        })
+    }
+
     /// Tells whether one of the points that were added last to what is `selected` may lie in it.
     pub(crate) fn has_newly(&self, selected: &SelectedSites) -> bool {
         selected.has_newly_within(self.bounds) || self.discs.iter().any(|disc| selected.has_newly_near(disc))

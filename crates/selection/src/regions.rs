@@ -11,13 +11,17 @@ use crate::hull::hull_corners;
 use crate::lattice_cells::LatticeCells;
 use crate::memory::BlockMemory;
 use crate::outline::MarkedCells;
-use crate::rounds::BlockState;
+use crate::rounds::{BlockState, FinishedBlock};
+use crate::selected_sites::SelectedSites;
 use crate::source::{BlockPoints, PointSource, SelectionStore};
 use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, PoisonError};
+
+/// Strips along borders are so wide that about as many rows of selected points lie on either side.
+const ROWS_OF_STRIP: i64 = 32;
 
 /// How clouds are divided.
 #[derive(Clone, Copy, Debug)]
@@ -43,10 +47,10 @@ pub(crate) struct Division<'a, E> {
     pub(crate) bays: Option<MarkedCells>,
     /// What is known of all blocks of the cloud.
     pub(crate) blocks: Vec<BlockState>,
-    /// The regions that have points.
-    pub(crate) regions: Vec<Region<'a, E>>,
-    /// For each corner of regions, the strips along the borders that meet there, as far as the middles of these.
-    pub(crate) strips: Vec<Region<'a, E>>,
+    /// The regions that have points, each with its cell.
+    pub(crate) regions: Vec<([i32; 2], Region<'a, E>)>,
+    /// Their borders.
+    pub(crate) borders: Borders<'a, E>,
 }
 
 /// Divides a cloud, which has `points` points in `bounds`. Points of its blocks that are in `memory` do not stay there. Looks for bays if there are
@@ -93,49 +97,92 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
             of_region.push(block);
         }
     }
-    let is_crowded = |cell: [i32; 2]| regions.get(&cell).is_some_and(|(_, count, _)| *count > sizes.undivided);
-    let strips = strips(source, &blocks, cells, bounds, is_crowded);
+    let crowded = regions.iter().filter(|(_, (_, count, _))| *count > sizes.undivided).map(|(cell, _)| *cell).collect();
+    let of_blocks = blocks.iter().map(|block| block.bounds).collect();
+    let borders = Borders { source, cells, bounds, blocks: of_blocks, crowded };
     let region = |(cell, (of_points, _, blocks))| {
         let parts = vec![cells.about_middle(cell, [cells.side() / 2; 2], bounds)];
-        Region { source, parts, blocks, bounds: of_points, taken: 0 }
+        (cell, Region { source, parts, blocks, bounds: of_points, taken: 0 })
     };
     let regions = regions.into_iter().map(region).collect();
     let bays = marked.map(|marked| {
         let (marked, hull) = marked.into_inner().unwrap_or_else(PoisonError::into_inner);
         marked.bays(&hull)
     });
-    Ok(Division { bays, blocks, regions, strips })
+    Ok(Division { bays, blocks, regions, borders })
 }
 
-/// Returns the strips along the borders of these cells that may have points of `blocks`, all of which lie in `bounds`. There are none at the corners
-/// of crowded cells: what is selected around these strips may not fit in the memory.
-fn strips<'a, E>(
+/// The borders of regions.
+pub(crate) struct Borders<'a, E> {
     source: &'a dyn PointSource<Error = E>,
-    blocks: &[BlockState],
     cells: LatticeCells,
+    /// The box of all points.
     bounds: Bounds<2>,
-    is_crowded: impl Fn([i32; 2]) -> bool,
-) -> Vec<Region<'a, E>> {
-    // The corners of the cells are the middles of these.
-    let shifted = cells.shifted();
-    let [half, quarter, narrow] = [2, 4, 8].map(|share| cells.side() / share);
-    let arms = |corner| [[narrow, half], [half, narrow]].map(|reach| shifted.about_middle(corner, reach, bounds));
-    let mut of_corners = BTreeMap::<[i32; 2], Vec<usize>>::new();
-    for (number, block) in blocks.iter().enumerate() {
-        let Some(of_block) = block.bounds else { continue };
-        for corner in shifted.of_box(of_block).filter(|corner| arms(*corner).iter().any(|arm| arm.meets(&of_block))) {
-            of_corners.entry(corner).or_default().push(number);
+    /// The boxes of all blocks.
+    blocks: Vec<Option<Bounds<2>>>,
+    /// Cells with too many points: what is selected around the strips at their corners may not fit in the memory.
+    crowded: BTreeSet<[i32; 2]>,
+}
+
+impl<'a, E> Borders<'a, E> {
+    /// Returns for each corner of regions the strips along the borders that meet there, as far as the middles of these, if they may have points.
+    /// So many points are `selected` in each region. There are none at the corners of crowded cells.
+    pub(crate) fn strips(&self, selected: &BTreeMap<[i32; 2], u64>) -> Vec<Strips<'a, E>> {
+        // The corners of the cells are the middles of these.
+        let (shifted, half) = (self.cells.shifted(), self.cells.side() / 2);
+        let mut strips = BTreeMap::<[i32; 2], (i64, Vec<usize>)>::new();
+        let arms = |corner, [narrow, long]: [i64; 2]| {
+            [[narrow, long], [long, narrow]].map(|reach| shifted.about_middle(corner, reach, self.bounds))
+        };
+        for (number, block) in self.blocks.iter().enumerate() {
+            for corner in block.iter().flat_map(|of_block| shifted.of_box(*of_block)) {
+                let (narrow, of_corner) =
+                    strips.entry(corner).or_insert_with(|| (self.reach(shifted.middle(corner), selected), Vec::new()));
+                if block.is_some_and(|block| arms(corner, [*narrow, half]).iter().any(|arm| arm.meets(&block))) {
+                    of_corner.push(number);
+                }
+            }
         }
+        strips.retain(|_, (narrow, blocks)| *narrow > 0 && !blocks.is_empty());
+        let strips = strips.into_iter().map(|(corner, (narrow, blocks))| {
+            let around = arms(corner, [2 * narrow, half + narrow]);
+            let bounds = around[0].union(around[1]);
+            let parts = arms(corner, [narrow, half]).to_vec();
+            Strips { points: Region { source: self.source, parts, blocks, bounds, taken: 0 }, around }
+        });
+        strips.collect()
     }
-    let is_at_crowd = |corner| {
-        let [x, y] = shifted.middle(corner).map(|along| along as i32);
-        [[x - 1, y - 1], [x, y - 1], [x - 1, y], [x, y]].into_iter().any(|[x, y]| is_crowded(cells.of(x, y)))
-    };
-    let region = |(corner, blocks)| {
-        let surroundings = shifted.about_middle(corner, [half + quarter; 2], bounds);
-        Region { source, parts: arms(corner).to_vec(), blocks, bounds: surroundings, taken: 0 }
-    };
-    of_corners.into_iter().filter(|(corner, _)| !is_at_crowd(*corner)).map(region).collect()
+
+    /// Returns how far the strips at a corner reach from the borders, 0 if it has none: so far that there are some rows of selected points.
+    fn reach(&self, [x, y]: [i64; 2], selected: &BTreeMap<[i32; 2], u64>) -> i64 {
+        let beside = [[x - 1, y - 1], [x, y - 1], [x - 1, y], [x, y]].map(|at| at.map(|along| along as i32));
+        let beside = beside.map(|[x, y]| self.cells.of(x, y));
+        if beside.iter().any(|cell| self.crowded.contains(cell)) {
+            return 0;
+        }
+        let fewest = beside.iter().filter_map(|cell| selected.get(cell)).min().map_or(1, |&fewest| fewest.max(1));
+        (ROWS_OF_STRIP * self.cells.side() / fewest.isqrt() as i64).clamp(1, self.cells.side() / 8)
+    }
+}
+
+/// The strips at a corner of regions.
+pub(crate) struct Strips<'a, E> {
+    pub(crate) points: Region<'a, E>,
+    /// The boxes of what is around them.
+    around: [Bounds<2>; 2],
+}
+
+impl<'a, E> Strips<'a, E> {
+    /// Returns what is `selected` in and around them.
+    ///
+    /// # Errors
+    /// [`sys::Error::Io`] on the file of those that are not in memory.
+    pub(crate) fn around(&self, selected: &SelectedSites) -> sys::Result<Vec<[i32; 3]>> {
+        let [along, across] = self.around;
+        let mut around = selected.within(along)?;
+        around.extend(selected.within(across)?.iter().filter(|point| !is_in(&along, point)));
+        Ok(around)
+    }
 }
 
 /// The points of a cloud that lie in a cell of the lattice, or in strips of one.
@@ -152,6 +199,17 @@ pub(crate) struct Region<'a, E> {
 }
 
 impl<E> Region<'_, E> {
+    /// Tells for each of its blocks, of which so much is known in the end, whether only points in the region can concern it. The region is a cell of
+    /// a cloud in the box `all`.
+    pub(crate) fn undisturbed(
+        &self,
+        blocks: Vec<Option<FinishedBlock>>,
+        all: Bounds<2>,
+    ) -> impl Iterator<Item = (usize, Option<FinishedBlock>)> {
+        let is_undisturbed = move |known: &FinishedBlock| self.parts.iter().all(|part| known.concerns_only(*part, all));
+        self.blocks.iter().copied().zip(blocks).map(move |(block, known)| (block, known.filter(is_undisturbed)))
+    }
+
     /// Returns the region when the selected points of others take so many bytes of memory.
     pub(crate) fn after(&self, taken: u64) -> Self {
         Region { parts: self.parts.clone(), blocks: self.blocks.clone(), taken, ..*self }
@@ -189,9 +247,8 @@ impl<E: Send + From<sys::Error>> PointSource for Region<'_, E> {
         self.source.store()
     }
 
-    fn asks_about(&self, _: [Site; 3]) -> bool {
-        // A triangle of a region need not be one of the whole.
-        false
+    fn asks_about(&self, corners: [Site; 3]) -> bool {
+        self.source.asks_about(corners)
     }
 
     fn after_round(&self) -> Result<(), E> {

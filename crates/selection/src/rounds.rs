@@ -38,6 +38,70 @@ pub struct Figures {
     pub mean: f64,
 }
 
+/// What is known of a block in the end.
+#[derive(Debug)]
+pub(crate) struct FinishedBlock {
+    /// Where points must be selected before any of its points exceeds the bound again, or is at another distance.
+    concern: Option<Concern>,
+    errors: BlockErrors,
+}
+
+impl FinishedBlock {
+    /// Tells whether only points in a box that is a part of the box of `all` points can concern it.
+    pub(crate) fn concerns_only(&self, part: Bounds<2>, all: Bounds<2>) -> bool {
+        self.concern.as_ref().is_some_and(|concern| concern.lies_in(part, all))
+    }
+
+    /// Tells whether one of the points that were added last to what is `selected` may concern it.
+    pub(crate) fn has_newly(&self, selected: &SelectedSites) -> bool {
+        self.concern.as_ref().is_none_or(|concern| concern.has_newly(selected))
+    }
+
+    /// Adds what is known of another part of the block.
+    pub(crate) fn join(self, other: FinishedBlock) -> FinishedBlock {
+        let concern = self.concern.zip(other.concern).map(|(a, b)| a.join(b));
+        FinishedBlock { concern, errors: self.errors.join(other.errors) }
+    }
+}
+
+/// What rounds have come to.
+pub(crate) struct Finished<'a> {
+    /// The selected points.
+    pub(crate) sites: SelectedSites<'a>,
+    points: u64,
+    /// The number of rounds.
+    pub(crate) rounds: u32,
+    /// For each block what is known of it; `None` if it has no points, or all are selected.
+    pub(crate) blocks: Vec<Option<FinishedBlock>>,
+}
+
+impl<'a> Finished<'a> {
+    /// Returns what all blocks come to.
+    pub(crate) fn into_selection(self) -> Selection<'a> {
+        let errors = self.blocks.into_iter().flatten().map(|block| block.errors);
+        let BlockErrors { greatest, sum, mut holding } = errors.reduce(BlockErrors::join).unwrap_or_default();
+        let steps = (1u64 << crate::VerticalError::FRACTION_BITS) as f64;
+        holding.sort_unstable();
+        // Several blocks may hold points of one.
+        holding.dedup_by(|other, first| {
+            let is_same = other.corners == first.corners;
+            if is_same {
+                first.join(other);
+            }
+            is_same
+        });
+        let figures = Figures {
+            points: self.points,
+            selected: self.sites.count(),
+            rounds: self.rounds,
+            greatest: greatest.map_or(0, |(error, _)| error),
+            worst: greatest.map(|(_, point)| point),
+            mean: sum as f64 / steps / self.points.max(1) as f64,
+        };
+        Selection { sites: self.sites, figures, holding }
+    }
+}
+
 /// Selected points, and what is known of them.
 #[derive(Debug)]
 pub struct Selection<'a> {
@@ -112,7 +176,9 @@ pub(crate) struct Rounds<'a, E> {
     wants_errors: bool,
     /// Whether points have been selected from the regions of the cloud already.
     is_after_regions: bool,
-    figures: Figures,
+    /// The number of points, and of rounds.
+    points: u64,
+    rounds: u32,
 }
 
 impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
@@ -136,8 +202,15 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             area: area_of(bounds),
             wants_errors: true,
             is_after_regions: false,
-            figures: Figures { points, ..Figures::default() },
+            points,
+            rounds: 0,
         }
+    }
+
+    /// Takes what is known of a block over from rounds that ended with the same triangles there.
+    pub(crate) fn take_over(&mut self, block: usize, known: FinishedBlock) {
+        let state = self.blocks[block].get_mut().unwrap_or_else(PoisonError::into_inner);
+        (state.settled, state.errors) = (known.concern, Some(known.errors));
     }
 
     /// Selects points before the first round.
@@ -164,21 +237,21 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         rounds: u32,
         bound: ErrorBound,
         samples: Samples,
-    ) -> Result<Selection<'a>, E> {
-        (self.outline, self.figures.rounds) = (outline, rounds);
+    ) -> Result<Finished<'a>, E> {
+        (self.outline, self.rounds) = (outline, rounds);
         self.is_after_regions = samples == Samples::AfterRegions;
         if self.outline.len() < 3 {
             return self.select_all();
         }
         for (number, sample) in samples.ladder(self.source.offset()).enumerate() {
             self.sample = sample;
-            for state in &mut self.blocks {
-                state.get_mut().unwrap_or_else(PoisonError::into_inner).settled = None;
-            }
             if number > 0 {
+                for state in &mut self.blocks {
+                    state.get_mut().unwrap_or_else(PoisonError::into_inner).settled = None;
+                }
                 self.add_beyond(very_far_above(bound))?;
             }
-            self.down_to(&samples.bound(sample.bound(bound, self.figures.points, self.area)), |_| ())?;
+            self.down_to(&samples.bound(sample.bound(bound, self.points, self.area)), |_| ())?;
         }
         self.finish()
     }
@@ -206,7 +279,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             self.free_place(&mut state.lock().unwrap_or_else(PoisonError::into_inner))?;
         }
         self.selected.free()?;
-        Ok((more, self.figures.rounds))
+        Ok((more, self.rounds))
     }
 
     /// Does rounds until no point of the sample exceeds `bound`. Hands over what they select.
@@ -230,7 +303,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         if self.selected.count() == before {
             return Ok(false);
         }
-        self.figures.rounds += 1;
+        self.rounds += 1;
         self.source.after_round()?;
         Ok(true)
     }
@@ -332,44 +405,29 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
         block.errors(|corners| self.source.asks_about(corners))
     }
 
-    fn finish(mut self) -> Result<Selection<'a>, E> {
-        let errors = (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|index| {
+    fn finish(self) -> Result<Finished<'a>, E> {
+        let blocks = (0..self.blocks.len()).into_par_iter().with_max_len(1).map(|index| {
             let mut state = self.blocks[index].lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(errors) = state.errors.take() {
-                return Ok::<_, E>(errors);
-            }
-            let block = self.block(index, &mut state)?;
+            let errors = match state.errors.take() {
+                Some(errors) => Some(errors),
+                None => self.block(index, &mut state)?.map(|block| self.errors_of(&block)),
+            };
             // Nothing needs it any more.
             self.free_place(&mut state)?;
-            Ok(block.map_or(BlockErrors::default(), |block| self.errors_of(&block)))
+            Ok::<_, E>(errors.map(|errors| FinishedBlock { concern: state.settled.take(), errors }))
         });
-        let errors: BlockErrors = errors.try_reduce(BlockErrors::default, |a, b| Ok(a.join(b)))?;
-        let steps = (1u64 << crate::VerticalError::FRACTION_BITS) as f64;
-        self.figures.mean = errors.sum as f64 / steps / self.figures.points.max(1) as f64;
-        (self.figures.greatest, self.figures.worst) =
-            errors.greatest.map_or((0, None), |(error, point)| (error, Some(point)));
-        self.figures.selected = self.selected.count();
-        let mut holding = errors.holding;
-        holding.sort_unstable();
-        // Several blocks may hold points of one.
-        holding.dedup_by(|other, first| {
-            let is_same = other.corners == first.corners;
-            if is_same {
-                first.join(other);
-            }
-            is_same
-        });
-        Ok(Selection { sites: self.selected, figures: self.figures, holding })
+        let blocks = blocks.collect::<Result<Vec<_>, E>>()?;
+        Ok(Finished { sites: self.selected, points: self.points, rounds: self.rounds, blocks })
     }
 
     /// Selects all points.
-    fn select_all(self) -> Result<Selection<'a>, E> {
-        let mut selected = self.selected.emptied();
+    fn select_all(self) -> Result<Finished<'a>, E> {
+        let mut sites = self.selected.emptied();
         for block in 0..self.source.blocks() {
-            selected.add(self.source.load(block)?.points)?;
+            sites.add(self.source.load(block)?.points)?;
         }
-        let figures = Figures { points: self.figures.points, selected: selected.count(), ..Figures::default() };
-        Ok(Selection { sites: selected, figures, holding: Vec::new() })
+        let blocks = self.blocks.iter().map(|_| None).collect();
+        Ok(Finished { sites, points: self.points, rounds: 0, blocks })
     }
 }
 

@@ -4,14 +4,15 @@ use crate::error_bound::ErrorBound;
 use crate::hull::hull_corners;
 use crate::memory::BlockMemory;
 use crate::outline::MarkedCells;
-use crate::regions::{Division, Region, RegionSizes, divide};
-use crate::rounds::{BlockState, Rounds, Selection};
+use crate::regions::{Division, RegionSizes, Strips, divide};
+use crate::rounds::{BlockState, Finished, FinishedBlock, Rounds, Selection};
 use crate::sample::Samples;
 use crate::seeds::Seeds;
 use crate::selected_sites::SelectedSites;
 use crate::source::{BYTES_PER_LISTED, BlockPoints, PointSource};
 use delaunay::geometry::Bounds;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Selects points from the blocks of `source` until every point is within `bound` of the triangulation of the selected ones.
 ///
@@ -20,7 +21,7 @@ use rayon::prelude::*;
 /// # Errors
 /// Those of `source`.
 pub fn select<S: PointSource>(source: &S, bound: ErrorBound) -> Result<Selection<'_>, S::Error> {
-    select_by_regions(source, bound, RegionSizes::USUAL, None)
+    Ok(select_by_regions(source, bound, RegionSizes::USUAL, None)?.into_selection())
 }
 
 /// As [`select`], for some points of a cloud that has `points_of_cloud`: the share that is selected is about that of the cloud.
@@ -33,7 +34,7 @@ pub fn select_like<S: PointSource>(
     bound: ErrorBound,
 ) -> Result<Selection<'_>, S::Error> {
     let unsampled = if points_of_cloud <= RegionSizes::USUAL.unsampled { u64::MAX } else { 0 };
-    select_by_regions(source, bound, RegionSizes { unsampled, ..RegionSizes::USUAL }, None)
+    Ok(select_by_regions(source, bound, RegionSizes { unsampled, ..RegionSizes::USUAL }, None)?.into_selection())
 }
 
 /// As [`select`]. A cloud of many points is divided into regions by the lattice, and points are selected from each of these by itself first. The
@@ -43,7 +44,7 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
     bound: ErrorBound,
     sizes: RegionSizes,
     bays: Option<&MarkedCells>,
-) -> Result<Selection<'a>, E> {
+) -> Result<Finished<'a>, E> {
     let memory = BlockMemory::new(source.memory());
     let blocks = load_blocks(source, &memory)?;
     let bounds = blocks.iter().filter_map(|state| state.bounds).reduce(Bounds::union);
@@ -68,27 +69,40 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
         return rounds.run(hull, 0, bound, samples);
     }
     let cells = bays.is_none().then(|| MarkedCells::none(bounds, points, source.offset()));
-    let Division { bays: own, blocks, regions, strips } =
+    let Division { bays: own, blocks, regions, borders } =
         divide(source, blocks, &memory, bounds, points, sizes, cells)?;
     let bays = bays.or(own.as_ref());
+    let mut known: Vec<Vec<Option<FinishedBlock>>> = blocks.iter().map(|_| Vec::new()).collect();
     let mut rounds = Rounds::new(source, blocks, bounds, memory);
-    let (mut corners, mut most, mut most_of_strips) = (Vec::new(), 0, 0);
+    let (mut corners, mut of_cells, mut most, mut most_of_strips) = (Vec::new(), BTreeMap::new(), 0, 0);
     let sizes = RegionSizes { unsampled: 0, ..sizes };
-    for region in &regions {
+    for (cell, region) in &regions {
         let region = region.after(rounds.selected().bytes());
         let of_region = select_by_regions(&region, bound, sizes, bays)?;
-        most = most.max(of_region.figures.rounds);
+        most = most.max(of_region.rounds);
         let selected = of_region.sites.within(region.bounds)?;
         of_region.sites.free()?;
+        region.undisturbed(of_region.blocks, bounds).for_each(|(block, part)| known[block].push(part));
+        of_cells.insert(*cell, selected.len() as u64);
         corners.extend(hull_corners(selected.clone()));
         rounds.add(selected)?;
     }
     let hull = hull_corners(corners);
+    let mut of_strips = Vec::new();
     if hull.len() > 2 {
-        for strips in &strips {
-            let (newly, done) = select_beside(strips, rounds.selected(), &hull, bound)?;
+        for strips in borders.strips(&of_cells) {
+            let (newly, done) = select_beside(&strips, rounds.selected(), &hull, bound)?;
             most_of_strips = most_of_strips.max(done);
+            of_strips.extend(&newly);
             rounds.add(newly)?;
+        }
+    }
+    let mut newly = SelectedSites::none(bounds, of_strips.len() as u64, None, u64::MAX);
+    newly.add(of_strips)?;
+    for (block, parts) in known.into_iter().enumerate() {
+        let whole = parts.into_iter().reduce(|a, b| a.zip(b).map(|(a, b)| a.join(b))).flatten();
+        if let Some(whole) = whole.filter(|whole| !whole.has_newly(&newly)) {
+            rounds.take_over(block, whole);
         }
     }
     rounds.run(hull, most + most_of_strips, bound, Samples::AfterRegions)
@@ -97,13 +111,13 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
 /// Selects points of strips beside those that are `selected` around them, and returns them with the number of rounds. The `hull` is that of the
 /// whole cloud.
 pub(crate) fn select_beside<E: Send + From<sys::Error>>(
-    strips: &Region<E>,
+    strips: &Strips<E>,
     selected: &SelectedSites,
     hull: &[[i32; 3]],
     bound: ErrorBound,
 ) -> Result<(Vec<[i32; 3]>, u32), E> {
-    let known = selected.within(strips.bounds)?;
-    let strips = &strips.after(selected.bytes() + known.len() as u64 * BYTES_PER_LISTED);
+    let known = strips.around(selected)?;
+    let strips = &strips.points.after(selected.bytes() + known.len() as u64 * BYTES_PER_LISTED);
     let memory = BlockMemory::new(strips.memory());
     let blocks = load_blocks(strips, &memory)?;
     let mut rounds = Rounds::new(strips, blocks, strips.bounds, memory);

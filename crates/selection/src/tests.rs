@@ -12,8 +12,9 @@ use delaunay::geometry::{Bounds, Site};
 use delaunay::mesh::half_edge::HalfEdgeMesh;
 use delaunay::triangulation::canonical;
 use proptest::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Memory that stands for a file. What is free is filled with ones.
 #[derive(Debug, Default)]
@@ -49,6 +50,8 @@ struct Cloud {
     memory: u64,
     waiting: Waiting,
     offset: [i64; 2],
+    /// How often each block was read.
+    loads: Vec<AtomicU32>,
 }
 
 /// So much memory holds all of a cloud of these tests.
@@ -62,7 +65,8 @@ impl Cloud {
         let cell = |p: &[i32; 3]| [p[0].div_euclid(side), p[1].div_euclid(side)];
         points.iter().for_each(|p| blocks.entry(cell(p)).or_default().points.push(*p));
         fixed.iter().for_each(|p| blocks.entry(cell(p)).or_default().fixed.push(*p));
-        Cloud { blocks: blocks.into_values().collect(), memory, waiting: Waiting::default(), offset: [0; 2] }
+        let loads = blocks.iter().map(|_| AtomicU32::new(0)).collect();
+        Cloud { blocks: blocks.into_values().collect(), memory, waiting: Waiting::default(), offset: [0; 2], loads }
     }
 }
 
@@ -78,6 +82,7 @@ impl PointSource for Cloud {
     }
 
     fn load(&self, block: usize) -> sys::Result<BlockPoints> {
+        self.loads[block].fetch_add(1, Ordering::Relaxed);
         Ok(self.blocks[block].clone())
     }
 
@@ -131,7 +136,7 @@ fn selected_with(
 ) -> (Vec<[i32; 3]>, Figures) {
     let bounds = bounds_of(points);
     let cloud = Cloud::new(points, fixed, side, memory);
-    let Selection { sites, figures, holding } = crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap();
+    let Selection { sites, figures, holding } = crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap().into_selection();
     let mut all: Vec<_> = sites.within(bounds).unwrap();
     holds_the_others(&all.iter().copied().collect::<BTreeSet<_>>(), points, &holding);
     all.sort_unstable();
@@ -404,7 +409,7 @@ fn regions_depend_on_the_points_alone() {
             let mut cloud = Cloud::new(&points, &points[700..702], side, memory);
             cloud.offset = offset.map(i64::from);
             let bounds = bounds_of(&points);
-            let found = crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap();
+            let found = crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap().into_selection();
             let all: BTreeSet<_> = found.sites.within(bounds).unwrap().into_iter().collect();
             assert_eq!(all.len() as u64, found.figures.selected, "some are selected twice");
             holds_the_others(&all, &points, &found.holding);
@@ -432,7 +437,7 @@ fn of_points_on_a_line_in_regions_all_are_selected() {
     let sizes = RegionSizes { unsampled: 0, undivided: 1_600, points: 100 };
     let cloud = Cloud::new(&points, &[], 700, AMPLE);
     let found = crate::select::select_by_regions(&cloud, ErrorBound::new(12, 1), sizes, None).unwrap();
-    assert_eq!(found.figures.selected, 2_000);
+    assert_eq!(found.sites.count(), 2_000);
 }
 
 /// The rounds over the whole cloud have little left to do after those along the borders of its regions.
@@ -446,8 +451,10 @@ fn strips_leave_little_to_the_whole_cloud() {
     let memory = || BlockMemory::new(AMPLE);
     let division = crate::regions::divide(&cloud, states(), &memory(), bounds, 20_000, sizes, None).unwrap();
     let mut selected = SelectedSites::none(bounds, 20_000, None, u64::MAX);
-    for region in &division.regions {
+    let mut of_cells = BTreeMap::new();
+    for (cell, region) in &division.regions {
         let of_region = crate::select::select_by_regions(region, bound, sizes, None).unwrap();
+        of_cells.insert(*cell, of_region.sites.count());
         selected.add(of_region.sites.within(region.bounds).unwrap()).unwrap();
     }
     let left = |selected: &SelectedSites| {
@@ -456,11 +463,24 @@ fn strips_leave_little_to_the_whole_cloud() {
         rounds.select_more(hull.clone(), bound).unwrap().0.len()
     };
     let without = left(&selected);
-    for strips in &division.strips {
-        selected.add(crate::select::select_beside(strips, &selected, &hull, bound).unwrap().0).unwrap();
+    for strips in division.borders.strips(&of_cells) {
+        selected.add(crate::select::select_beside(&strips, &selected, &hull, bound).unwrap().0).unwrap();
     }
     let with = left(&selected);
     assert!(with <= without / 10 && without > 20, "{with} instead of {without}");
+}
+
+/// Far from the borders of regions, the rounds over the whole cloud do not read a block again.
+#[test]
+fn what_is_known_of_regions_is_taken_over() {
+    let sizes = RegionSizes { unsampled: 0, undivided: 10_000, points: 1_000 };
+    let points = hills(20_000);
+    let cloud = Cloud::new(&points, &[], 700, AMPLE);
+    crate::select::select_by_regions(&cloud, ErrorBound::new(12, 1), sizes, None).unwrap();
+    // All are read for the division and for the region.
+    let loads: Vec<u32> = cloud.loads.iter().map(|loads| loads.load(Ordering::Relaxed)).collect();
+    let [twice, more] = [2..3, 3..u32::MAX].map(|range| loads.iter().filter(|loads| range.contains(loads)).count());
+    assert!(twice > loads.len() / 8 && twice + more == loads.len(), "{twice} and {more} of {}", loads.len());
 }
 
 /// Strips along the borders of regions have all points near these, once, and no others.
@@ -477,17 +497,22 @@ fn strips_lie_along_the_borders_of_regions() {
         let of = |region: &crate::regions::Region<_>| -> Vec<[i32; 3]> {
             (0..region.blocks()).flat_map(|block| region.load(block).unwrap().points).collect()
         };
-        let mut of_regions: Vec<_> = division.regions.iter().flat_map(of).collect();
+        let mut of_regions: Vec<_> = division.regions.iter().flat_map(|(_, region)| of(region)).collect();
         of_regions.sort_unstable();
         let mut sorted = points.clone();
         sorted.sort_unstable();
         assert!(of_regions == sorted && division.regions.len() > 25);
-        // Regions are 32 steps wide, so that a strip reaches four steps from a border.
-        let is_near = |p: &[i32; 3]| (0..2).any(|k| (i64::from(p[k]) + offset[k] + 4).rem_euclid(32) < 8);
-        sorted.retain(is_near);
-        let mut of_strips: Vec<_> = division.strips.iter().flat_map(of).collect();
-        of_strips.sort_unstable();
-        assert_eq!(of_strips, sorted, "{offset:?}");
+        // Regions are 32 steps wide. With few selected points in each, a strip reaches four steps from a border; with many, so far as half the rows.
+        for (selected, reach) in [(1, 4), (512 * 512, 2)] {
+            let of_cells = division.regions.iter().map(|(cell, _)| (*cell, selected)).collect();
+            let is_near =
+                |p: &&[i32; 3]| (0..2).any(|k| (i64::from(p[k]) + offset[k] + reach).rem_euclid(32) < 2 * reach);
+            let expected: Vec<_> = sorted.iter().filter(is_near).copied().collect();
+            let strips = division.borders.strips(&of_cells);
+            let mut of_strips: Vec<_> = strips.iter().flat_map(|strips| of(&strips.points)).collect();
+            of_strips.sort_unstable();
+            assert_eq!(of_strips, expected, "{offset:?}");
+        }
     }
 }
 

@@ -187,7 +187,7 @@ mod tests {
         };
         let tree = Tree { nodes: (0..12).map(inner).collect(), ..Tree::default() };
         let merges: Vec<usize> = (0..12).filter(|&node| tree.is_merge(NodeIndex::new(node))).collect();
-        assert_eq!((LAYOUT, merges), (47, vec![0, 2, 5, 8, 11]));
+        assert_eq!((LAYOUT, merges), (48, vec![0, 2, 5, 8, 11]));
         let mut above = Tree { part: PartIndex::new(1), leaves: vec![NodeIndex::new(12)], ..tree };
         above.nodes.push(TreeNode { kind: NodeKind::Leaf(PartIndex::FIRST.tile(0)), ..inner(12) });
         assert!((0..12).all(|node| above.is_merge(NodeIndex::new(node))));

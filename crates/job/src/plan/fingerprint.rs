@@ -66,7 +66,7 @@ pub struct JobIdentity {
 
 /// Version of the records in the store, of the plan, of the names and bytes of results, and of which nodes merge. It changes with every
 /// change of these, so that no run misreads what another version left, or mixes its results with them.
-pub(crate) const LAYOUT: u32 = 47;
+pub(crate) const LAYOUT: u32 = 48;
 
 /// What the results of a job depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
