@@ -136,7 +136,8 @@ fn selected_with(
 ) -> (Vec<[i32; 3]>, Figures) {
     let bounds = bounds_of(points);
     let cloud = Cloud::new(points, fixed, side, memory);
-    let Selection { sites, figures, holding } = crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap().into_selection();
+    let Selection { sites, figures, holding } =
+        crate::select::select_by_regions(&cloud, bound, sizes, None).unwrap().into_selection();
     let mut all: Vec<_> = sites.within(bounds).unwrap();
     holds_the_others(&all.iter().copied().collect::<BTreeSet<_>>(), points, &holding);
     all.sort_unstable();
