@@ -7,6 +7,7 @@ use crate::lod::fit::{Sample, distance_above, improve, samples, volume};
 use crate::lod::outline::Outline;
 use crate::lod::vertex_cells::plane;
 use delaunay::geometry::predicates::orient2d;
+use std::collections::{HashMap, HashSet};
 use sys::Result;
 
 /// A simplified terrain for viewers.
@@ -149,37 +150,75 @@ fn reaches(
     places: &[u32],
 ) -> Vec<Reach> {
     let mut reaches = vec![Reach::default(); filling.positions.len()];
-    let site_of = filling.numbers();
     let highest = positions.iter().map(|p| p[2]).max().unwrap_or(0);
     let above = |v: u32| distance_above(filling, places[v as usize] as usize, positions[v as usize]);
-    for ring in &outline.rings {
-        let ends: Vec<(usize, u32)> = (0..ring.len())
-            .map(|at| (at, site_of[ring[at] as usize]))
-            .filter(|&(_, site)| border.binary_search_by_key(&site, |edge| edge[0]).is_ok())
-            .collect();
-        for (k, &(first, from)) in ends.iter().enumerate() {
-            let (last, to) = ends[(k + 1) % ends.len()];
-            if from == to {
-                // A single vertex has no edge beside it.
-                continue;
-            }
-            let edge = BorderEdge { ends: [from, to].map(|site| filling.positions[site as usize]) };
-            let count = (last + ring.len() - first) % ring.len() + 1;
-            let vertices = (first..first + count).map(|at| ring[at % ring.len()]);
-            let offset = |v: u32| {
-                let (position, triangle) = (positions[v as usize], places[v as usize] as usize);
-                let drop = STEEPER * edge.distance(position) * slope(filling, triangle);
-                Offset { share: edge.share(position), above: above(v), drop }
-            };
-            let along: Vec<Offset> = vertices.map(offset).collect();
-            let mut ends = [from, to].map(|site| reaches[site as usize]);
-            raise(&mut ends, edge.ends.map(|end| f64::from(highest) - f64::from(end[2])), &along);
-            for (site, reach) in [from, to].into_iter().zip(ends) {
-                reaches[site as usize] = reach;
-            }
+    for (sites, part) in parts_beside(outline, &filling.numbers(), border) {
+        let edge = BorderEdge { ends: sites.map(|site| filling.positions[site as usize]) };
+        let offset = |v: u32| {
+            let (position, triangle) = (positions[v as usize], places[v as usize] as usize);
+            let drop = STEEPER * edge.distance(position) * slope(filling, triangle);
+            let share = edge.share(position);
+            Offset { share, above: above(v), above_edge: f64::from(position[2]) - edge.height(share), drop }
+        };
+        let along: Vec<Offset> = part.vertices().map(offset).collect();
+        let mut ends = sites.map(|site| reaches[site as usize]);
+        raise(&mut ends, edge.ends.map(|end| f64::from(highest) - f64::from(end[2])), &along);
+        for (site, reach) in sites.into_iter().zip(ends) {
+            reaches[site as usize] = reach;
         }
     }
     reaches
+}
+
+/// A part of a ring of the outline.
+#[derive(Clone, Copy)]
+struct RingPart<'a> {
+    ring: &'a [u32],
+    first: usize,
+    last: usize,
+}
+
+impl<'a> RingPart<'a> {
+    fn len(&self) -> usize {
+        (self.last + self.ring.len() - self.first) % self.ring.len() + 1
+    }
+
+    fn vertices(self) -> impl Iterator<Item = u32> + 'a {
+        (self.first..self.first + self.len()).map(move |at| self.ring[at % self.ring.len()])
+    }
+}
+
+/// Returns the parts of the outline from each site of the `border` to the next along a ring, with these two sites, and those beside the other edges
+/// of the border. `site_of` has the site of each vertex.
+fn parts_beside<'a>(
+    outline: &'a Outline,
+    site_of: &[u32],
+    border: &[[u32; 2]],
+) -> impl Iterator<Item = ([u32; 2], RingPart<'a>)> {
+    let is_on_border = |site: u32| border.binary_search_by_key(&site, |edge| edge[0]).is_ok();
+    let (mut parts, mut places) = (Vec::new(), HashMap::<u32, Vec<(&[u32], usize)>>::new());
+    for ring in &outline.rings {
+        let sites = ring.iter().map(|&v| site_of[v as usize]).enumerate();
+        let ends: Vec<(usize, u32)> = sites.filter(|(_, site)| is_on_border(*site)).collect();
+        ends.iter().for_each(|&(at, site)| places.entry(site).or_default().push((ring, at)));
+        let following = ends.iter().zip(ends.iter().cycle().skip(1));
+        // A single vertex has no edge beside it.
+        let following = following.filter(|((_, from), (_, to))| from != to);
+        parts.extend(following.map(|(&(first, from), &(last, to))| ([from, to], RingPart { ring, first, last })));
+    }
+    // Where the border passes by a bay whose bank has sites of the border too, an edge leads past these.
+    let known: HashSet<[u32; 2]> = parts.iter().map(|(sites, _)| *sites).collect();
+    let places_of = move |site: u32| places.get(&site).cloned().unwrap_or_default();
+    let shortest = move |[from, to]: [u32; 2]| {
+        let (from, to) = (places_of(from), places_of(to));
+        let pairs = from.iter().flat_map(|from| to.iter().map(move |to| (from, to)));
+        let pairs = pairs.filter(|((ring, _), (other, _))| std::ptr::eq(*ring, *other));
+        let parts = pairs
+            .flat_map(|(&(ring, a), &(_, b))| [[a, b], [b, a]].map(|[first, last]| RingPart { ring, first, last }));
+        parts.min_by_key(RingPart::len)
+    };
+    let others: Vec<[u32; 2]> = border.iter().filter(|sites| !known.contains(*sites)).copied().collect();
+    parts.into_iter().chain(others.into_iter().filter_map(move |sites| Some((sites, shortest(sites)?))))
 }
 
 /// Raises the ends of an edge until it is not below the vertices `along` it, and neither of them much more than it takes, nor by more than
@@ -207,10 +246,12 @@ fn raise(ends: &mut [Reach; 2], most: [f64; 2], along: &[Offset]) {
             }
         }
     }
-    let lowest = along.iter().map(|offset| offset.above).fold(0.0, f64::min);
+    let least = |of: fn(&Offset) -> f64| along.iter().map(of).fold(0.0, f64::min);
+    let (below, below_edge) = (least(|offset| offset.above), least(|offset| offset.above_edge));
     let drop = along.iter().map(|offset| offset.drop).fold(0.0, f64::max);
     ends.iter_mut().for_each(|end| {
-        end.below = end.below.min(lowest);
+        end.below = end.below.min(below);
+        end.below_edge = end.below_edge.min(below_edge);
         end.drop = end.drop.max(drop);
     });
 }
@@ -224,6 +265,8 @@ struct Offset {
     share: f64,
     /// How far the vertex is above the simplified terrain, in steps of z.
     above: f64,
+    /// How far it is above the edge there, before that is raised.
+    above_edge: f64,
     /// How far the ground may fall from the vertex to the edge, in steps of z.
     drop: f64,
 }
@@ -255,6 +298,12 @@ impl BorderEdge {
         (product(point) / product(to)).clamp(0.0, 1.0)
     }
 
+    /// Returns the height of the edge at a part of it.
+    fn height(&self, share: f64) -> f64 {
+        let [from, to] = self.ends.map(|end| f64::from(end[2]));
+        (1.0 - share) * from + share * to
+    }
+
     /// Returns the distance of `point` from the line of the edge in the plane, in lattice steps.
     fn distance(&self, point: [i32; 3]) -> f64 {
         let [from, to] = self.ends.map(plane);
@@ -279,6 +328,8 @@ struct Reach {
     above: f64,
     /// The least one, at most 0.
     below: f64,
+    /// The least one from the edges themselves, at most 0: beside a steep triangle, the surface may be far below its edge.
+    below_edge: f64,
     /// How far the ground may fall from the outline to the border.
     drop: f64,
 }
@@ -290,7 +341,8 @@ impl Reach {
         let fitted = f64::from(height);
         let top = (fitted + self.above).ceil() as i32;
         let outline = fitted + self.below;
-        let bottom = (outline - spare).min((outline - self.drop).max(deepest)).floor() as i32;
+        let lowest = fitted + self.below.min(self.below_edge);
+        let bottom = (lowest - spare).min((outline - self.drop).max(deepest)).floor() as i32;
         // The two are different vertices.
         [bottom.min(top.saturating_sub(1)), top]
     }
@@ -301,6 +353,22 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// The sites 2 and 4 are on the bank of a bay that the edge from 0 to 6 passes by.
+    #[test]
+    fn every_edge_of_the_border_has_a_part_of_the_outline_beside_it() {
+        let border = [[0, 6], [2, 4], [4, 6], [6, 2], [6, 8], [8, 0]];
+        let outline = Outline { edges: Vec::new(), on: vec![true; 24], rings: vec![(0..24).collect()] };
+        let site_of: Vec<u32> = (0..24).map(|v| if [0, 2, 4, 6, 8].contains(&v) { v } else { u32::MAX }).collect();
+        let parts = parts_beside(&outline, &site_of, &border);
+        let beside: HashMap<[u32; 2], Vec<u32>> =
+            parts.map(|(sites, part)| (sites, part.vertices().collect())).collect();
+        assert_eq!(beside[&[0, 6]], [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(beside[&[6, 2]], [2, 3, 4, 5, 6]);
+        assert_eq!(beside[&[6, 8]], [6, 7, 8]);
+        assert_eq!(beside[&[8, 0]].len(), 17);
+        assert!(border.iter().all(|edge| beside.contains_key(edge)));
+    }
+
     proptest! {
         /// The ends of an edge are somewhat below the highest place, and vertices along it are as high as that at most.
         #[test]
@@ -310,7 +378,10 @@ mod tests {
             heights in prop::collection::vec((0.0f64..=1.0, -80.0f64..=0.0), 1..12),
         ) {
             let [from, to] = fitted;
-            let offset = |&(share, height): &(f64, f64)| Offset { share, above: height - from - share * (to - from), drop: 0.0 };
+            let offset = |&(share, height): &(f64, f64)| {
+                let above = height - from - share * (to - from);
+                Offset { share, above, above_edge: above, drop: 0.0 }
+            };
             let along: Vec<Offset> = heights.iter().map(offset).collect();
             let mut ends = before.map(|above| Reach { above, ..Reach::default() });
             raise(&mut ends, fitted.map(|height| -height), &along);

@@ -10,7 +10,7 @@ use breaklines::{BreaklineOptions, Breaklines, Feature, FeatureId, FeatureKind, 
 use delaunay::geometry::predicates::orient2d;
 use delaunay::triangulation::reference::triangulate;
 use lattice::{Lattice, shortest_decimal};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// A frame whose steps are metres.
 fn frame() -> Frame {
@@ -153,13 +153,17 @@ fn ragged(side: i32, holes: &[([i32; 2], i32)], height: impl Fn(i32, i32) -> i32
     Tile::of(&all.positions, all.triangles.iter().filter(|t| is_inside(t)).copied().collect())
 }
 
-/// Returns the height of an edge at the place on it that is nearest to a point in the plane, and the square of the distance.
-fn nearest([from, to]: &[[i32; 3]; 2], point: [i32; 3]) -> (f64, f64) {
+/// Returns the place on an edge that is nearest to a point in the plane.
+fn nearest_place([from, to]: &[[i32; 3]; 2], point: [i32; 3]) -> [f64; 3] {
     let along = |p: &[i32; 3], axis: usize| f64::from(p[axis] - from[axis]);
     let length: f64 = (0..2).map(|axis| along(to, axis).powi(2)).sum();
     let share = ((0..2).map(|axis| along(to, axis) * along(&point, axis)).sum::<f64>() / length).clamp(0.0, 1.0);
-    let square = (0..2).map(|axis| (along(&point, axis) - share * along(to, axis)).powi(2)).sum();
-    (square, f64::from(from[2]) + share * along(to, 2))
+    [0, 1, 2].map(|axis| f64::from(from[axis]) + share * along(to, axis))
+}
+
+/// Returns the square of the distance of a place from a point in the plane.
+fn distance([x, y, _]: [f64; 3], point: [i32; 3]) -> f64 {
+    (x - f64::from(point[0])).powi(2) + (y - f64::from(point[1])).powi(2)
 }
 
 #[test]
@@ -169,9 +173,9 @@ fn the_border_is_not_below_the_outline() {
     let simple = simplified(&tile, tile.triangles.len() / 6, None);
     let (fine, coarse) = (outline(&tile), outline(&simple.surface));
     let missing = |edge: &[[i32; 3]; 2]| {
-        let of_border =
-            coarse.iter().map(|border| nearest(border, edge[0])).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
-        f64::from(edge[0][2]) - of_border.1
+        let places = coarse.iter().map(|border| nearest_place(border, edge[0]));
+        let of_border = places.min_by(|a, b| distance(*a, edge[0]).total_cmp(&distance(*b, edge[0]))).unwrap();
+        f64::from(edge[0][2]) - of_border[2]
     };
     // What is beside the border leans a little to one side or the other.
     let below = |least: f64| fine.iter().filter(|edge| missing(edge) > least).count();
@@ -252,6 +256,37 @@ fn skirts_hang_below_the_whole_border() {
         let around = shown.positions[surface.positions.len()..].iter().filter(near).map(|p| p[2]).min();
         assert!(around.is_none_or(|bottom| bottom < z + 20), "{x} {y}");
     }
+}
+
+/// A neighbour ends at the outline. Where the border passes by a bay whose bank has vertices of the border too, its edges do not follow the outline
+/// from one to the next.
+#[test]
+fn skirts_reach_below_the_outline_beside_every_edge() {
+    let mut seen = 0;
+    for salt in 0..24 {
+        let noise = |x: i32, y: i32| (x.wrapping_mul(31 + salt) ^ y.wrapping_mul(17)) % 60;
+        let holes = [([200, 200], 60), ([300, 160], 25), ([120, 290], 30), ([40, 120], 60), ([300, 40], 25)];
+        let tile = ragged(40 + salt, &holes, noise);
+        let Simple { shown, surface, .. } = simplified(&tile, tile.triangles.len() / 5, None);
+        // Where parts of the border meet, the lower ends differ by a step.
+        let mut lowest = HashMap::<[i32; 2], i32>::new();
+        for &[x, y, z] in &shown.positions[surface.positions.len()..] {
+            lowest.entry([x, y]).and_modify(|lowest| *lowest = (*lowest).max(z)).or_insert(z);
+        }
+        let skirts = outline(&surface).into_iter().map(|edge| edge.map(|[x, y, _]| [x, y, lowest[&[x, y]]]));
+        let skirts: Vec<[[i32; 3]; 2]> = skirts.collect();
+        for [vertex, _] in outline(&tile) {
+            let beside = skirts.iter().map(|skirt| nearest_place(skirt, vertex));
+            let place = beside.min_by(|a, b| distance(*a, vertex).total_cmp(&distance(*b, vertex))).unwrap();
+            let middle = [0, 1].map(|axis| (place[axis] + f64::from(vertex[axis])) / 2.0);
+            // Where the terrain itself is between them, another edge is across from the vertex.
+            if height(&tile, middle).is_none() {
+                seen += 1;
+                assert!(place[2] <= f64::from(vertex[2]), "{salt}: {} below {vertex:?}", place[2]);
+            }
+        }
+    }
+    assert!(seen > 1000, "{seen}");
 }
 
 /// A neighbour may show the outline as it is. Where one of its vertices lies just inside the border, the surface must not be below it either.
