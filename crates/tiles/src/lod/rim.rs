@@ -150,7 +150,8 @@ fn reaches(
     places: &[u32],
 ) -> Vec<Reach> {
     let mut reaches = vec![Reach::default(); filling.positions.len()];
-    let highest = positions.iter().map(|p| p[2]).max().unwrap_or(0);
+    let heights = || positions.iter().map(|p| p[2]);
+    let [lowest, highest] = [heights().min(), heights().max()].map(|z| f64::from(z.unwrap_or(0)));
     let above = |v: u32| distance_above(filling, places[v as usize] as usize, positions[v as usize]);
     for (sites, part) in parts_beside(outline, &filling.numbers(), border) {
         let edge = BorderEdge { ends: sites.map(|site| filling.positions[site as usize]) };
@@ -158,11 +159,24 @@ fn reaches(
             let (position, triangle) = (positions[v as usize], places[v as usize] as usize);
             let drop = STEEPER * edge.distance(position) * slope(filling, triangle);
             let share = edge.share(position);
-            Offset { share, above: above(v), above_edge: f64::from(position[2]) - edge.height(share), drop }
+            Offset { share, above: above(v), below_edge: edge.height(share) - f64::from(position[2]), drop }
         };
         let along: Vec<Offset> = part.vertices().map(offset).collect();
-        let mut ends = sites.map(|site| reaches[site as usize]);
-        raise(&mut ends, edge.ends.map(|end| f64::from(highest) - f64::from(end[2])), &along);
+        let ends = sites.map(|site| reaches[site as usize]);
+        let [above, lowered] = [
+            raised(ends.map(|end| end.above), edge.ends.map(|end| highest - f64::from(end[2])), &along, |at| at.above),
+            raised(ends.map(|end| end.lowered), edge.ends.map(|end| f64::from(end[2]) - lowest), &along, |at| {
+                at.below_edge
+            }),
+        ];
+        let below = along.iter().map(|offset| offset.above).fold(0.0, f64::min);
+        let drop = along.iter().map(|offset| offset.drop).fold(0.0, f64::max);
+        let ends = [0, 1].map(|k| Reach {
+            above: above[k],
+            below: ends[k].below.min(below),
+            lowered: lowered[k],
+            drop: ends[k].drop.max(drop),
+        });
         for (site, reach) in sites.into_iter().zip(ends) {
             reaches[site as usize] = reach;
         }
@@ -221,39 +235,36 @@ fn parts_beside<'a>(
     parts.into_iter().chain(others.into_iter().filter_map(move |sites| Some((sites, shortest(sites)?))))
 }
 
-/// Raises the ends of an edge until it is not below the vertices `along` it, and neither of them much more than it takes, nor by more than
-/// `most`: where both are as high as the terrain is anywhere, the edge hides all of it.
-fn raise(ends: &mut [Reach; 2], most: [f64; 2], along: &[Offset]) {
+/// Raises the ends of an edge by as much until it reaches what is `wanted` of the vertices `along` it, and neither of them much more than it takes,
+/// nor by more than `most`: where both are raised so far, the edge reaches all that is wanted anywhere. They are raised by `ends` already.
+fn raised(mut ends: [f64; 2], most: [f64; 2], along: &[Offset], wanted: impl Fn(&Offset) -> f64) -> [f64; 2] {
     // Other edges may need what they have already.
-    let most = [0, 1].map(|k| ends[k].above.max(most[k]));
+    let most = [0, 1].map(|k| ends[k].max(most[k]));
+    let missing = |ends: [f64; 2], offset: &Offset| {
+        let [first, second] = offset.weights();
+        wanted(offset) - first * ends[0] - second * ends[1]
+    };
     for _ in 0..RAISES {
         for offset in along {
-            let more = offset.missing(ends);
+            let more = missing(ends, offset);
             if more > 0.0 {
                 let weights = offset.weights();
                 let square: f64 = weights.iter().map(|weight| weight * weight).sum();
-                ends.iter_mut().zip(weights).for_each(|(end, weight)| end.above += more * weight / square);
+                ends.iter_mut().zip(weights).for_each(|(end, weight)| *end += more * weight / square);
             }
         }
     }
-    ends.iter_mut().zip(most).for_each(|(end, most)| end.above = end.above.min(most));
+    ends = [0, 1].map(|k| ends[k].min(most[k]));
     // What one end cannot do, the other one does.
     for offset in along {
         for k in 0..2 {
-            let (more, weight) = (offset.missing(ends), offset.weights()[k]);
+            let (more, weight) = (missing(ends, offset), offset.weights()[k]);
             if more > 0.0 && weight > 0.0 {
-                ends[k].above = (ends[k].above + more / weight).min(most[k]);
+                ends[k] = (ends[k] + more / weight).min(most[k]);
             }
         }
     }
-    let least = |of: fn(&Offset) -> f64| along.iter().map(of).fold(0.0, f64::min);
-    let (below, below_edge) = (least(|offset| offset.above), least(|offset| offset.above_edge));
-    let drop = along.iter().map(|offset| offset.drop).fold(0.0, f64::max);
-    ends.iter_mut().for_each(|end| {
-        end.below = end.below.min(below);
-        end.below_edge = end.below_edge.min(below_edge);
-        end.drop = end.drop.max(drop);
-    });
+    ends
 }
 
 /// How often the ends of an edge are raised vertex by vertex, by as little as it takes.
@@ -265,8 +276,8 @@ struct Offset {
     share: f64,
     /// How far the vertex is above the simplified terrain, in steps of z.
     above: f64,
-    /// How far it is above the edge there, before that is raised.
-    above_edge: f64,
+    /// How far it is below the edge there, before that is raised.
+    below_edge: f64,
     /// How far the ground may fall from the vertex to the edge, in steps of z.
     drop: f64,
 }
@@ -275,12 +286,6 @@ impl Offset {
     /// Returns how much of each end's height the place on the edge has.
     fn weights(&self) -> [f64; 2] {
         [1.0 - self.share, self.share]
-    }
-
-    /// Returns how much the place on the edge must rise, with its ends raised so far, until the vertex is not above it.
-    fn missing(&self, ends: &[Reach; 2]) -> f64 {
-        let [first, second] = self.weights();
-        self.above - first * ends[0].above - second * ends[1].above
     }
 }
 
@@ -328,8 +333,8 @@ struct Reach {
     above: f64,
     /// The least one, at most 0.
     below: f64,
-    /// The least one from the edges themselves, at most 0: beside a steep triangle, the surface may be far below its edge.
-    below_edge: f64,
+    /// How far the vertex must go down until no edge is above the outline beside it: there may be a steep triangle between the two.
+    lowered: f64,
     /// How far the ground may fall from the outline to the border.
     drop: f64,
 }
@@ -341,7 +346,7 @@ impl Reach {
         let fitted = f64::from(height);
         let top = (fitted + self.above).ceil() as i32;
         let outline = fitted + self.below;
-        let lowest = fitted + self.below.min(self.below_edge);
+        let lowest = outline.min(fitted - self.lowered);
         let bottom = (lowest - spare).min((outline - self.drop).max(deepest)).floor() as i32;
         // The two are different vertices.
         [bottom.min(top.saturating_sub(1)), top]
@@ -378,19 +383,19 @@ mod tests {
             heights in prop::collection::vec((0.0f64..=1.0, -80.0f64..=0.0), 1..12),
         ) {
             let [from, to] = fitted;
+            let above = |(share, height): (f64, f64)| height - from - share * (to - from);
             let offset = |&(share, height): &(f64, f64)| {
-                let above = height - from - share * (to - from);
-                Offset { share, above, above_edge: above, drop: 0.0 }
+                let above = above((share, height));
+                Offset { share, above, below_edge: -above, drop: 0.0 }
             };
             let along: Vec<Offset> = heights.iter().map(offset).collect();
-            let mut ends = before.map(|above| Reach { above, ..Reach::default() });
-            raise(&mut ends, fitted.map(|height| -height), &along);
-            for (offset, (_, height)) in along.iter().zip(&heights) {
-                prop_assert!(offset.missing(&ends) < 1e-9, "{} at {}", offset.missing(&ends), height);
-                prop_assert!(ends.iter().all(|end| end.below <= offset.above.min(0.0)));
+            let ends = raised(before, fitted.map(|height| -height), &along, |offset| offset.above);
+            for ((offset, height), [first, second]) in along.iter().zip(&heights).map(|both| (both, ends)) {
+                let missing = above(*height) - (1.0 - offset.share) * first - offset.share * second;
+                prop_assert!(missing < 1e-9, "{missing} at {height:?}");
             }
             for ((end, before), height) in ends.iter().zip(before).zip(fitted) {
-                prop_assert!((before..=before.max(-height)).contains(&end.above), "{} from {}", end.above, before);
+                prop_assert!((before..=before.max(-height)).contains(end), "{end} from {before}");
             }
         }
     }
