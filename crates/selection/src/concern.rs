@@ -1,5 +1,6 @@
 //! The part of the plane where what is selected concerns a block.
 
+use crate::area::Area;
 use crate::disc::Disc;
 use crate::selected_sites::SelectedSites;
 use delaunay::geometry::Bounds;
@@ -38,6 +39,11 @@ impl Concern {
                     && (concern.max[axis] <= part.max[axis] || all.max[axis] <= part.max[axis])
             })
         })
+    }
+
+    /// Tells whether it meets a box. Of one near it this may be told too.
+    pub(crate) fn meets(&self, bounds: &Bounds<2>) -> bool {
+        self.bounds.meets(bounds) || self.discs.iter().any(|disc| disc.meets(bounds))
     }
 
     /// Tells whether one of the points that were added last to what is `selected` may lie in it.

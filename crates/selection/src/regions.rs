@@ -20,9 +20,6 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, PoisonError};
 
-/// Strips along borders are so wide that about as many rows of selected points lie on either side.
-const ROWS_OF_STRIP: i64 = 32;
-
 /// How clouds are divided.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RegionSizes {
@@ -32,13 +29,16 @@ pub(crate) struct RegionSizes {
     pub(crate) undivided: u64,
     /// A region has at least so many points on average, and less than four times as many.
     pub(crate) points: u64,
+    /// Strips along borders are so wide that about as many rows of selected points lie on either side.
+    pub(crate) rows_of_strip: u32,
 }
 
 impl RegionSizes {
     /// The sizes of all jobs. Points at the borders of regions are superfluous in the end: with regions of a million to four million points,
     /// some percent of the vertices. A region takes some hundred megabytes. Without samples, selecting takes up to half as long
     /// again. It usually selects fewer vertices, up to a sixth fewer where walls are.
-    pub(crate) const USUAL: RegionSizes = RegionSizes { unsampled: 1 << 20, undivided: 1 << 24, points: 1 << 20 };
+    pub(crate) const USUAL: RegionSizes =
+        RegionSizes { unsampled: 1 << 20, undivided: 1 << 24, points: 1 << 20, rows_of_strip: 32 };
 }
 
 /// A cloud in regions.
@@ -99,7 +99,7 @@ pub(crate) fn divide<'a, E: Send + From<sys::Error>>(
     }
     let crowded = regions.iter().filter(|(_, (_, count, _))| *count > sizes.undivided).map(|(cell, _)| *cell).collect();
     let of_blocks = blocks.iter().map(|block| block.bounds).collect();
-    let borders = Borders { source, cells, bounds, blocks: of_blocks, crowded };
+    let borders = Borders { source, cells, bounds, blocks: of_blocks, crowded, rows: sizes.rows_of_strip };
     let region = |(cell, (of_points, _, blocks))| {
         let parts = vec![cells.about_middle(cell, [cells.side() / 2; 2], bounds)];
         (cell, Region { source, parts, blocks, bounds: of_points, taken: 0 })
@@ -122,6 +122,8 @@ pub(crate) struct Borders<'a, E> {
     blocks: Vec<Option<Bounds<2>>>,
     /// Cells with too many points: what is selected around the strips at their corners may not fit in the memory.
     crowded: BTreeSet<[i32; 2]>,
+    /// The rows of selected points in a strip on either side.
+    rows: u32,
 }
 
 impl<'a, E> Borders<'a, E> {
@@ -161,7 +163,7 @@ impl<'a, E> Borders<'a, E> {
             return 0;
         }
         let fewest = beside.iter().filter_map(|cell| selected.get(cell)).min().map_or(1, |&fewest| fewest.max(1));
-        (ROWS_OF_STRIP * self.cells.side() / fewest.isqrt() as i64).clamp(1, self.cells.side() / 8)
+        (i64::from(self.rows) * self.cells.side() / fewest.isqrt() as i64).clamp(1, self.cells.side() / 8)
     }
 }
 
@@ -199,14 +201,15 @@ pub(crate) struct Region<'a, E> {
 }
 
 impl<E> Region<'_, E> {
-    /// Tells for each of its blocks, of which so much is known in the end, whether only points in the region can concern it. The region is a cell of
-    /// a cloud in the box `all`.
+    /// Returns the number of each of its blocks and what is known of it in the end, if only points in the region can concern it. The region is a cell
+    /// of a cloud in the box `all`.
     pub(crate) fn undisturbed(
         &self,
         blocks: Vec<Option<FinishedBlock>>,
         all: Bounds<2>,
     ) -> impl Iterator<Item = (usize, Option<FinishedBlock>)> {
-        let is_undisturbed = move |known: &FinishedBlock| self.parts.iter().all(|part| known.concerns_only(*part, all));
+        let cell = self.parts.iter().copied().reduce(Bounds::union).unwrap_or(self.bounds);
+        let is_undisturbed = move |known: &FinishedBlock| known.concerns_only(cell, all);
         self.blocks.iter().copied().zip(blocks).map(move |(block, known)| (block, known.filter(is_undisturbed)))
     }
 

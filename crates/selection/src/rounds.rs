@@ -43,6 +43,7 @@ pub struct Figures {
 pub(crate) struct FinishedBlock {
     /// Where points must be selected before any of its points exceeds the bound again, or is at another distance.
     concern: Option<Concern>,
+    /// The distances of its points.
     errors: BlockErrors,
 }
 
@@ -52,9 +53,9 @@ impl FinishedBlock {
         self.concern.as_ref().is_some_and(|concern| concern.lies_in(part, all))
     }
 
-    /// Tells whether one of the points that were added last to what is `selected` may concern it.
-    pub(crate) fn has_newly(&self, selected: &SelectedSites) -> bool {
-        self.concern.as_ref().is_none_or(|concern| concern.has_newly(selected))
+    /// Tells whether one of the points that were added last to what is `selected`, all of which lie in the box `newly`, may concern it.
+    pub(crate) fn has_newly(&self, selected: &SelectedSites, newly: &Bounds<2>) -> bool {
+        self.concern.as_ref().is_none_or(|concern| concern.meets(newly) && concern.has_newly(selected))
     }
 
     /// Adds what is known of another part of the block.
@@ -71,7 +72,7 @@ pub(crate) struct Finished<'a> {
     points: u64,
     /// The number of rounds.
     pub(crate) rounds: u32,
-    /// For each block what is known of it; `None` if it has no points, or all are selected.
+    /// For each block what is known of it; `None` if it has no points. Nothing is known if all points of the cloud are selected without rounds.
     pub(crate) blocks: Vec<Option<FinishedBlock>>,
 }
 
@@ -172,8 +173,6 @@ pub(crate) struct Rounds<'a, E> {
     sample: Sample,
     /// The area of the box of the points, in square lattice steps.
     area: f64,
-    /// Whether the distances of all points are wanted in the end.
-    wants_errors: bool,
     /// Whether points have been selected from the regions of the cloud already.
     is_after_regions: bool,
     /// The number of points, and of rounds.
@@ -200,7 +199,6 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
             swap: SwapSpace::default(),
             sample: Sample::all(source.offset()),
             area: area_of(bounds),
-            wants_errors: true,
             is_after_regions: false,
             points,
             rounds: 0,
@@ -272,7 +270,7 @@ impl<'a, E: Send + From<sys::Error>> Rounds<'a, E> {
     /// # Errors
     /// Those of the source.
     pub(crate) fn select_more(mut self, outline: Vec<[i32; 3]>, bound: ErrorBound) -> Result<(Vec<[i32; 3]>, u32), E> {
-        (self.outline, self.wants_errors) = (outline, false);
+        self.outline = outline;
         let mut more = Vec::new();
         self.down_to(&RoundBound::everywhere(bound), |found| more.push(found))?;
         for state in &self.blocks {

@@ -74,7 +74,7 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
     let bays = bays.or(own.as_ref());
     let mut known: Vec<Vec<Option<FinishedBlock>>> = blocks.iter().map(|_| Vec::new()).collect();
     let mut rounds = Rounds::new(source, blocks, bounds, memory);
-    let (mut corners, mut of_cells, mut most, mut most_of_strips) = (Vec::new(), BTreeMap::new(), 0, 0);
+    let (mut corners, mut selected_by_cell, mut most, mut most_of_strips) = (Vec::new(), BTreeMap::new(), 0, 0);
     let sizes = RegionSizes { unsampled: 0, ..sizes };
     for (cell, region) in &regions {
         let region = region.after(rounds.selected().bytes());
@@ -83,27 +83,27 @@ pub(crate) fn select_by_regions<'a, E: Send + From<sys::Error>>(
         let selected = of_region.sites.within(region.bounds)?;
         of_region.sites.free()?;
         region.undisturbed(of_region.blocks, bounds).for_each(|(block, part)| known[block].push(part));
-        of_cells.insert(*cell, selected.len() as u64);
+        selected_by_cell.insert(*cell, selected.len() as u64);
         corners.extend(hull_corners(selected.clone()));
         rounds.add(selected)?;
     }
     let hull = hull_corners(corners);
-    let mut of_strips = Vec::new();
     if hull.len() > 2 {
-        for strips in borders.strips(&of_cells) {
+        for strips in borders.strips(&selected_by_cell) {
             let (newly, done) = select_beside(&strips, rounds.selected(), &hull, bound)?;
             most_of_strips = most_of_strips.max(done);
-            of_strips.extend(&newly);
+            let Some(area) = Bounds::of_points(newly.iter().map(|p| [p[0], p[1]])) else { continue };
             rounds.add(newly)?;
+            for part in known.iter_mut().flatten() {
+                part.take_if(|part| part.has_newly(rounds.selected(), &area));
+            }
         }
     }
-    let mut newly = SelectedSites::none(bounds, of_strips.len() as u64, None, u64::MAX);
-    newly.add(of_strips)?;
+    // What was selected so far disturbs none of the blocks that are left.
+    rounds.add(Vec::new())?;
     for (block, parts) in known.into_iter().enumerate() {
-        let whole = parts.into_iter().reduce(|a, b| a.zip(b).map(|(a, b)| a.join(b))).flatten();
-        if let Some(whole) = whole.filter(|whole| !whole.has_newly(&newly)) {
-            rounds.take_over(block, whole);
-        }
+        let whole = parts.into_iter().reduce(|a, b| a.zip(b).map(|(a, b)| a.join(b)));
+        whole.flatten().into_iter().for_each(|whole| rounds.take_over(block, whole));
     }
     rounds.run(hull, most + most_of_strips, bound, Samples::AfterRegions)
 }

@@ -396,7 +396,7 @@ fn a_crowd_does_not_depend_on_blocks() {
 /// With small regions: every point is within the bound, and nothing depends on the blocks, or on where the lattice begins.
 #[test]
 fn regions_depend_on_the_points_alone() {
-    let sizes = RegionSizes { unsampled: 0, undivided: 1_600, points: 100 };
+    let sizes = RegionSizes { unsampled: 0, undivided: 1_600, points: 100, rows_of_strip: 2 };
     let mut clouds = vec![hills(3_000)];
     // A dense cluster about a corner of regions, which are divided again, and a line far away.
     clouds.push((0..8_000).map(|i| [i % 90 - 45, i / 90 - 44, (i % 90) * (i / 90) % 29]).collect());
@@ -435,7 +435,7 @@ fn regions_depend_on_the_points_alone() {
 #[test]
 fn of_points_on_a_line_in_regions_all_are_selected() {
     let points: Vec<[i32; 3]> = (0..2_000).map(|i| [3 * i, 7 * i, i % 5]).collect();
-    let sizes = RegionSizes { unsampled: 0, undivided: 1_600, points: 100 };
+    let sizes = RegionSizes { unsampled: 0, undivided: 1_600, points: 100, ..RegionSizes::USUAL };
     let cloud = Cloud::new(&points, &[], 700, AMPLE);
     let found = crate::select::select_by_regions(&cloud, ErrorBound::new(12, 1), sizes, None).unwrap();
     assert_eq!(found.sites.count(), 2_000);
@@ -446,7 +446,7 @@ fn of_points_on_a_line_in_regions_all_are_selected() {
 fn strips_leave_little_to_the_whole_cloud() {
     let (points, bound) = (hills(20_000), ErrorBound::new(12, 1));
     let (bounds, hull) = (bounds_of(&points), crate::hull::hull_corners(points.clone()));
-    let sizes = RegionSizes { unsampled: 0, undivided: 10_000, points: 1_000 };
+    let sizes = RegionSizes { unsampled: 0, undivided: 10_000, points: 1_000, ..RegionSizes::USUAL };
     let cloud = Cloud::new(&points, &[], 2_000, AMPLE);
     let states = || cloud.blocks.iter().map(|block| BlockState::of(&block.points)).collect();
     let memory = || BlockMemory::new(AMPLE);
@@ -471,17 +471,27 @@ fn strips_leave_little_to_the_whole_cloud() {
     assert!(with <= without / 10 && without > 20, "{with} instead of {without}");
 }
 
-/// Far from the borders of regions, the rounds over the whole cloud do not read a block again.
+/// Far from the borders of regions, the rounds over the whole cloud do not read a block again, and come to the same.
 #[test]
 fn what_is_known_of_regions_is_taken_over() {
-    let sizes = RegionSizes { unsampled: 0, undivided: 10_000, points: 1_000 };
+    let sizes = RegionSizes { unsampled: 0, undivided: 10_000, points: 1_000, rows_of_strip: 8 };
     let points = hills(20_000);
-    let cloud = Cloud::new(&points, &[], 700, AMPLE);
-    crate::select::select_by_regions(&cloud, ErrorBound::new(12, 1), sizes, None).unwrap();
+    let run = |side: i32| {
+        let cloud = Cloud::new(&points, &[], side, AMPLE);
+        let found = crate::select::select_by_regions(&cloud, ErrorBound::new(12, 1), sizes, None).unwrap();
+        let Selection { sites, figures, holding } = found.into_selection();
+        let mut all = sites.within(bounds_of(&points)).unwrap();
+        all.sort_unstable();
+        let loads: Vec<u32> = cloud.loads.iter().map(|loads| loads.load(Ordering::Relaxed)).collect();
+        ((all, figures, holding), loads)
+    };
+    let (found, loads) = run(700);
     // All are read for the division and for the region.
-    let loads: Vec<u32> = cloud.loads.iter().map(|loads| loads.load(Ordering::Relaxed)).collect();
     let [twice, more] = [2..3, 3..u32::MAX].map(|range| loads.iter().filter(|loads| range.contains(loads)).count());
     assert!(twice > loads.len() / 8 && twice + more == loads.len(), "{twice} and {more} of {}", loads.len());
+    // A single block lies in no region.
+    let (as_one, loads) = run(1_000_000);
+    assert!(loads[0] > 3 && found == as_one);
 }
 
 /// Strips along the borders of regions have all points near these, once, and no others.
@@ -491,7 +501,7 @@ fn strips_lie_along_the_borders_of_regions() {
     for offset in [[0; 2], [12_345, -999]] {
         let mut cloud = Cloud::new(&points, &[], 23, AMPLE);
         cloud.offset = offset;
-        let sizes = RegionSizes { unsampled: 0, undivided: 20_000, points: 1_000 };
+        let sizes = RegionSizes { unsampled: 0, undivided: 20_000, points: 1_000, ..RegionSizes::USUAL };
         let blocks = cloud.blocks.iter().map(|block| BlockState::of(&block.points)).collect();
         let (memory, bounds) = (BlockMemory::new(AMPLE), bounds_of(&points));
         let division = crate::regions::divide(&cloud, blocks, &memory, bounds, 40_000, sizes, None).unwrap();
@@ -503,7 +513,7 @@ fn strips_lie_along_the_borders_of_regions() {
         let mut sorted = points.clone();
         sorted.sort_unstable();
         assert!(of_regions == sorted && division.regions.len() > 25);
-        // Regions are 32 steps wide. With few selected points in each, a strip reaches four steps from a border; with many, so far as half the rows.
+        // Regions are 32 steps wide. With few selected points in each, a strip reaches four steps from a border; with many, so far that 32 rows are in it.
         for (selected, reach) in [(1, 4), (512 * 512, 2)] {
             let of_cells = division.regions.iter().map(|(cell, _)| (*cell, selected)).collect();
             let is_near =
@@ -524,7 +534,7 @@ fn bays_are_those_of_the_whole_cloud() {
     let shore = |along: i32| if along % 128 < 64 { 200 } else { 180 };
     let all = (0..600).flat_map(|y| (0..600).map(move |x| [x, y, 7]));
     let points: Vec<[i32; 3]> = all.filter(|[x, y, _]| *x < shore(*y) || *y < shore(*x)).collect();
-    let sizes = RegionSizes { unsampled: 0, undivided: 160_000, points: 10_000 };
+    let sizes = RegionSizes { unsampled: 0, undivided: 160_000, points: 10_000, ..RegionSizes::USUAL };
     let cloud = Cloud::new(&points, &[], 90, AMPLE);
     let found = crate::select::select_by_regions(&cloud, ErrorBound::new(1, 1), sizes, None).unwrap();
     let found = found.sites.within(bounds_of(&points)).unwrap();

@@ -153,7 +153,7 @@ fn reaches(
     let heights = || positions.iter().map(|p| p[2]);
     let [lowest, highest] = [heights().min(), heights().max()].map(|z| f64::from(z.unwrap_or(0)));
     let above = |v: u32| distance_above(filling, places[v as usize] as usize, positions[v as usize]);
-    for (sites, part) in parts_beside(outline, &filling.numbers(), border) {
+    for (sites, part) in parts_beside(positions, outline, &filling.numbers(), border) {
         let edge = BorderEdge { ends: sites.map(|site| filling.positions[site as usize]) };
         let offset = |v: u32| {
             let (position, triangle) = (positions[v as usize], places[v as usize] as usize);
@@ -200,21 +200,30 @@ impl<'a> RingPart<'a> {
     fn vertices(self) -> impl Iterator<Item = u32> + 'a {
         (self.first..self.first + self.len()).map(move |at| self.ring[at % self.ring.len()])
     }
+
+    /// Tells whether the terrain is between the part and the straight line from one of its ends to the other.
+    fn encloses_terrain(&self, positions: &[[i32; 3]]) -> bool {
+        let place = |v: u32| plane(positions[v as usize]);
+        let start = place(self.ring[self.first]);
+        let doubled = self.vertices().zip(self.vertices().skip(1));
+        doubled.map(|(a, b)| i128::from(orient2d(start, place(a), place(b)))).sum::<i128>() > 0
+    }
 }
 
 /// Returns the parts of the outline from each site of the `border` to the next along a ring, with these two sites, and those beside the other edges
 /// of the border. `site_of` has the site of each vertex.
 fn parts_beside<'a>(
+    positions: &[[i32; 3]],
     outline: &'a Outline,
     site_of: &[u32],
     border: &[[u32; 2]],
-) -> impl Iterator<Item = ([u32; 2], RingPart<'a>)> {
+) -> Vec<([u32; 2], RingPart<'a>)> {
     let is_on_border = |site: u32| border.binary_search_by_key(&site, |edge| edge[0]).is_ok();
-    let (mut parts, mut places) = (Vec::new(), HashMap::<u32, Vec<(&[u32], usize)>>::new());
-    for ring in &outline.rings {
+    let (mut parts, mut places) = (Vec::new(), HashMap::<u32, Vec<(usize, usize)>>::new());
+    for (number, ring) in outline.rings.iter().enumerate() {
         let sites = ring.iter().map(|&v| site_of[v as usize]).enumerate();
         let ends: Vec<(usize, u32)> = sites.filter(|(_, site)| is_on_border(*site)).collect();
-        ends.iter().for_each(|&(at, site)| places.entry(site).or_default().push((ring, at)));
+        ends.iter().for_each(|&(at, site)| places.entry(site).or_default().push((number, at)));
         let following = ends.iter().zip(ends.iter().cycle().skip(1));
         // A single vertex has no edge beside it.
         let following = following.filter(|((_, from), (_, to))| from != to);
@@ -222,21 +231,22 @@ fn parts_beside<'a>(
     }
     // Where the border passes by a bay whose bank has sites of the border too, an edge leads past these.
     let known: HashSet<[u32; 2]> = parts.iter().map(|(sites, _)| *sites).collect();
-    let places_of = move |site: u32| places.get(&site).cloned().unwrap_or_default();
-    let shortest = move |[from, to]: [u32; 2]| {
-        let (from, to) = (places_of(from), places_of(to));
+    for &sites in border.iter().filter(|sites| !known.contains(*sites)) {
+        let [from, to] = sites.map(|site| places.get(&site).map_or(&[][..], Vec::as_slice));
         let pairs = from.iter().flat_map(|from| to.iter().map(move |to| (from, to)));
-        let pairs = pairs.filter(|((ring, _), (other, _))| std::ptr::eq(*ring, *other));
-        let parts = pairs
-            .flat_map(|(&(ring, a), &(_, b))| [[a, b], [b, a]].map(|[first, last]| RingPart { ring, first, last }));
-        parts.min_by_key(RingPart::len)
-    };
-    let others: Vec<[u32; 2]> = border.iter().filter(|sites| !known.contains(*sites)).copied().collect();
-    parts.into_iter().chain(others.into_iter().filter_map(move |sites| Some((sites, shortest(sites)?))))
+        let both_ways = pairs.filter(|((ring, _), (other, _))| ring == other).flat_map(|(&(number, a), &(_, b))| {
+            let ring = &outline.rings[number];
+            [[a, b], [b, a]].map(|[first, last]| RingPart { ring, first, last })
+        });
+        // What lies between the edge and the outline beside it is no part of the terrain, which is on the left of a ring.
+        let beside = both_ways.min_by_key(|part| (part.encloses_terrain(positions), part.len()));
+        parts.extend(beside.map(|part| (sites, part)));
+    }
+    parts
 }
 
-/// Raises the ends of an edge by as much until it reaches what is `wanted` of the vertices `along` it, and neither of them much more than it takes,
-/// nor by more than `most`: where both are raised so far, the edge reaches all that is wanted anywhere. They are raised by `ends` already.
+/// Raises the ends of an edge, which are raised by `ends` already, until the edge is raised as far as is `wanted` of the vertices `along` it. Neither
+/// of them rises much more than that takes, nor by more than `most`. How far the ends must go down is found in the same way.
 fn raised(mut ends: [f64; 2], most: [f64; 2], along: &[Offset], wanted: impl Fn(&Offset) -> f64) -> [f64; 2] {
     // Other edges may need what they have already.
     let most = [0, 1].map(|k| ends[k].max(most[k]));
@@ -360,18 +370,29 @@ mod tests {
 
     /// The sites 2 and 4 are on the bank of a bay that the edge from 0 to 6 passes by.
     #[test]
-    fn every_edge_of_the_border_has_a_part_of_the_outline_beside_it() {
+    fn every_edge_of_the_border_has_the_outline_beside_it() {
         let border = [[0, 6], [2, 4], [4, 6], [6, 2], [6, 8], [8, 0]];
-        let outline = Outline { edges: Vec::new(), on: vec![true; 24], rings: vec![(0..24).collect()] };
-        let site_of: Vec<u32> = (0..24).map(|v| if [0, 2, 4, 6, 8].contains(&v) { v } else { u32::MAX }).collect();
-        let parts = parts_beside(&outline, &site_of, &border);
-        let beside: HashMap<[u32; 2], Vec<u32>> =
-            parts.map(|(sites, part)| (sites, part.vertices().collect())).collect();
-        assert_eq!(beside[&[0, 6]], [0, 1, 2, 3, 4, 5, 6]);
-        assert_eq!(beside[&[6, 2]], [2, 3, 4, 5, 6]);
-        assert_eq!(beside[&[6, 8]], [6, 7, 8]);
-        assert_eq!(beside[&[8, 0]].len(), 17);
-        assert!(border.iter().all(|edge| beside.contains_key(edge)));
+        let bay = [[0, 0], [1, 5], [1, 9], [5, 9], [9, 9], [9, 5], [10, 0]];
+        let around = |count: i32| {
+            let others = (1..=count).map(|i| [30 + i % 2, i]).chain([[0, 20]]);
+            let places: Vec<[i32; 3]> =
+                bay.into_iter().chain([[20, 0]]).chain(others).map(|[x, y]| [x, y, 0]).collect();
+            let count = places.len() as u32;
+            let outline =
+                Outline { edges: Vec::new(), on: vec![true; places.len()], rings: vec![(0..count).collect()] };
+            let site_of: Vec<u32> =
+                (0..count).map(|v| if [0, 2, 4, 6, 8].contains(&v) { v } else { u32::MAX }).collect();
+            let parts = parts_beside(&places, &outline, &site_of, &border);
+            let parts = parts.into_iter().map(|(sites, part)| (sites, part.vertices().collect()));
+            parts.collect::<HashMap<[u32; 2], Vec<u32>>>()
+        };
+        // The rest of the ring may have more vertices than the bay, or fewer.
+        for beside in [around(20), around(1)] {
+            assert_eq!(beside[&[0, 6]], [0, 1, 2, 3, 4, 5, 6]);
+            assert_eq!(beside[&[6, 2]], [2, 3, 4, 5, 6]);
+            assert_eq!(beside[&[6, 8]], [6, 7, 8]);
+            assert!(border.iter().all(|edge| beside.contains_key(edge)));
+        }
     }
 
     proptest! {

@@ -269,11 +269,11 @@ fn skirts_reach_below_the_outline_beside_every_edge() {
         let tile = ragged(40 + salt, &holes, noise);
         let Simple { shown, surface, .. } = simplified(&tile, tile.triangles.len() / 5, None);
         // Where parts of the border meet, the lower ends differ by a step.
-        let mut lowest = HashMap::<[i32; 2], i32>::new();
+        let mut bottoms = HashMap::<[i32; 2], i32>::new();
         for &[x, y, z] in &shown.positions[surface.positions.len()..] {
-            lowest.entry([x, y]).and_modify(|lowest| *lowest = (*lowest).max(z)).or_insert(z);
+            bottoms.entry([x, y]).and_modify(|bottom| *bottom = (*bottom).max(z)).or_insert(z);
         }
-        let skirts = outline(&surface).into_iter().map(|edge| edge.map(|[x, y, _]| [x, y, lowest[&[x, y]]]));
+        let skirts = outline(&surface).into_iter().map(|edge| edge.map(|[x, y, _]| [x, y, bottoms[&[x, y]]]));
         let skirts: Vec<[[i32; 3]; 2]> = skirts.collect();
         for [vertex, _] in outline(&tile) {
             let beside = skirts.iter().map(|skirt| nearest_place(skirt, vertex));
